@@ -1,0 +1,173 @@
+//! One piece of a stroke.
+
+use kurbo::{Affine, CubicBez, Line, ParamCurve, ParamCurveArclen, ParamCurveDeriv, Point, Rect, Vec2};
+
+use crate::EllipticArc;
+
+/// One piece of a stroke: a straight line, an arc of an ellipse, or a cubic Bézier curve; mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Segment {
+    /// Straight from `p0` to `p1`.
+    Line(Line),
+    /// An arc of a circle or an ellipse.
+    Arc(EllipticArc),
+    /// A cubic Bézier curve.
+    Cubic(CubicBez),
+}
+
+/// The linear part of an affine map applied to a vector.
+pub(crate) fn apply_linear(map: Affine, v: Vec2) -> Vec2 {
+    let [a, b, c, d, _, _] = map.as_coeffs();
+    Vec2::new(a * v.x + c * v.y, b * v.x + d * v.y)
+}
+
+impl Segment {
+    /// First point, mm.
+    pub fn start(&self) -> Point {
+        match self {
+            Self::Line(line) => line.p0,
+            Self::Arc(arc) => arc.eval(0.0),
+            Self::Cubic(cubic) => cubic.p0,
+        }
+    }
+
+    /// Last point, mm.
+    pub fn end(&self) -> Point {
+        match self {
+            Self::Line(line) => line.p1,
+            Self::Arc(arc) => arc.eval(1.0),
+            Self::Cubic(cubic) => cubic.p3,
+        }
+    }
+
+    /// Point at `t` from 0 to 1, mm.
+    pub fn eval(&self, t: f64) -> Point {
+        match self {
+            Self::Line(line) => line.eval(t),
+            Self::Arc(arc) => arc.eval(t),
+            Self::Cubic(cubic) => cubic.eval(t),
+        }
+    }
+
+    /// First and second derivative by `t`, mm.
+    pub fn derivatives(&self, t: f64) -> (Vec2, Vec2) {
+        match self {
+            Self::Line(line) => (line.p1 - line.p0, Vec2::ZERO),
+            Self::Arc(arc) => arc.derivatives(t),
+            Self::Cubic(cubic) => {
+                let first = cubic.deriv();
+                (first.eval(t).to_vec2(), first.deriv().eval(t).to_vec2())
+            }
+        }
+    }
+
+    /// The part between `t0` and `t1`.
+    pub fn part(&self, t0: f64, t1: f64) -> Self {
+        match self {
+            Self::Line(line) => Self::Line(line.subsegment(t0..t1)),
+            Self::Arc(arc) => Self::Arc(arc.part(t0, t1)),
+            Self::Cubic(cubic) => Self::Cubic(cubic.subsegment(t0..t1)),
+        }
+    }
+
+    /// The same points in the opposite order.
+    pub fn reversed(&self) -> Self {
+        match self {
+            Self::Line(line) => Self::Line(Line::new(line.p1, line.p0)),
+            Self::Arc(arc) => Self::Arc(arc.reversed()),
+            Self::Cubic(c) => Self::Cubic(CubicBez::new(c.p3, c.p2, c.p1, c.p0)),
+        }
+    }
+
+    /// The same piece under an affine map.
+    pub fn transformed(&self, map: Affine) -> Self {
+        match self {
+            Self::Line(line) => Self::Line(map * *line),
+            Self::Arc(arc) => Self::Arc(arc.transformed(map)),
+            Self::Cubic(cubic) => Self::Cubic(map * *cubic),
+        }
+    }
+
+    /// Length in mm, to 1e-6 mm.
+    pub fn length(&self) -> f64 {
+        match self {
+            Self::Line(line) => libm::hypot(line.p1.x - line.p0.x, line.p1.y - line.p0.y),
+            Self::Arc(arc) => match arc.circle_radius() {
+                Some(radius) => radius * arc.sweep.abs(),
+                None => elliptic_length(arc),
+            },
+            Self::Cubic(cubic) => cubic.arclen(1e-6),
+        }
+    }
+
+    /// The smallest upright rectangle that holds the piece, mm.
+    pub fn bounding_box(&self) -> Rect {
+        match self {
+            Self::Line(line) => Rect::from_points(line.p0, line.p1),
+            Self::Arc(arc) => {
+                let mut bounds = Rect::from_points(arc.eval(0.0), arc.eval(1.0));
+                // x is extreme where tan u = b.x / a.x, y likewise: two angles a turn each.
+                for (a, b) in [(arc.a.x, arc.b.x), (arc.a.y, arc.b.y)] {
+                    let extreme = libm::atan2(b, a);
+                    for u in angles_within(arc, extreme, std::f64::consts::PI) {
+                        bounds = bounds.union_pt(arc.at_angle(u));
+                    }
+                }
+                bounds
+            }
+            Self::Cubic(cubic) => kurbo::Shape::bounding_box(cubic),
+        }
+    }
+
+    /// Into how many equal steps of `t` the piece must be cut so that every chord stays within `tolerance` mm of it.
+    ///
+    /// Cubics: the chord of `f` over a step `h` of the parameter leaves it by `h^2/8 max|f''|` at the most, and the
+    /// second derivative of a cubic is largest at one of its ends. Arcs: [`EllipticArc::chord_count`].
+    pub fn chord_count(&self, tolerance: f64) -> usize {
+        match self {
+            Self::Line(_) => 1,
+            Self::Arc(arc) => arc.chord_count(tolerance),
+            Self::Cubic(_) => {
+                let (_, at_start) = self.derivatives(0.0);
+                let (_, at_end) = self.derivatives(1.0);
+                let largest = at_start.hypot2().max(at_end.hypot2()).sqrt();
+                let count = (largest / (8.0 * tolerance)).sqrt().ceil();
+                if count.is_finite() && count >= 1.0 { count as usize } else { 1 }
+            }
+        }
+    }
+
+    /// Calls `to` with the ends of chords that stay within `tolerance` mm of the piece; the start is not repeated.
+    pub fn flatten(&self, tolerance: f64, mut to: impl FnMut(Point)) {
+        let count = self.chord_count(tolerance);
+        for step in 1..count {
+            to(self.eval(step as f64 / count as f64));
+        }
+        to(self.end());
+    }
+}
+
+/// The angles `base + k * every` inside the arc's range of the parameter.
+pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64> {
+    let (low, high) =
+        if arc.sweep < 0.0 { (arc.start + arc.sweep, arc.start) } else { (arc.start, arc.start + arc.sweep) };
+    let first = ((low - base) / every).ceil();
+    let last = ((high - base) / every).floor();
+    if !(last >= first) {
+        return Vec::new();
+    }
+    // More than a turn says nothing new.
+    let count = (last - first).min(2.0 * std::f64::consts::TAU / every) as usize + 1;
+    (0..count).map(|k| base + (first + k as f64) * every).collect()
+}
+
+/// Length of an elliptic arc by composite Simpson quadrature on short steps of the parameter.
+///
+/// The integrand |p'(u)| is analytic except where the ellipse is flat; steps of pi/128 give better than 1e-6 mm for
+/// ellipses of a page's size with axes 20:1, and the chords below them can never be far off for flatter ones.
+fn elliptic_length(arc: &EllipticArc) -> f64 {
+    let steps = 2 * (arc.sweep.abs() / (std::f64::consts::PI / 128.0)).ceil().clamp(1.0, 65536.0) as usize;
+    let speed = |k: usize| arc.derivatives(k as f64 / steps as f64).0.hypot2().sqrt();
+    let inner: f64 = (1..steps).map(|k| if k % 2 == 1 { 4.0 } else { 2.0 } * speed(k)).sum();
+    (speed(0) + inner + speed(steps)) / (3.0 * steps as f64)
+}

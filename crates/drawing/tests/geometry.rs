@@ -1,0 +1,145 @@
+//! Properties of the geometry: affine maps, reversal, flattening, clipping.
+
+use drawing::{
+    Affine, CubicBez, EllipticArc, Line, Pen, Point, Rect, Segment, Span, Stroke, Vec2, clip_segment,
+};
+use proptest::prelude::*;
+
+fn point() -> impl Strategy<Value = Point> {
+    (-200.0..200.0f64, -200.0..200.0f64).prop_map(|(x, y)| Point::new(x, y))
+}
+
+fn segment() -> impl Strategy<Value = Segment> {
+    prop_oneof![
+        (point(), point()).prop_map(|(a, b)| Segment::Line(Line::new(a, b))),
+        (point(), 0.01..150.0f64, -7.0..7.0f64, -6.2..6.2f64)
+            .prop_map(|(c, r, s, w)| Segment::Arc(EllipticArc::circular(c, r, s, w))),
+        (point(), point(), point(), -7.0..7.0f64, -6.2..6.2f64).prop_map(|(c, a, b, s, w)| {
+            Segment::Arc(EllipticArc { center: c, a: a.to_vec2(), b: b.to_vec2(), start: s, sweep: w })
+        }),
+        (point(), point(), point(), point())
+            .prop_map(|(a, b, c, d)| Segment::Cubic(CubicBez::new(a, b, c, d))),
+    ]
+}
+
+fn map() -> impl Strategy<Value = Affine> {
+    proptest::array::uniform6(-3.0..3.0f64).prop_map(Affine::new)
+}
+
+fn distance_to_chord(p: Point, a: Point, b: Point) -> f64 {
+    let (d, v) = (b - a, p - a);
+    let t = if d.hypot2() > 0.0 { (v.dot(d) / d.hypot2()).clamp(0.0, 1.0) } else { 0.0 };
+    (v - t * d).hypot2().sqrt()
+}
+
+proptest! {
+    #[test]
+    fn affine_maps_commute_with_evaluation(s in segment(), m in map(), t in 0.0..=1.0f64) {
+        let d = s.transformed(m).eval(t) - m * s.eval(t);
+        prop_assert!(d.hypot2().sqrt() < 1e-9);
+    }
+
+    #[test]
+    fn reversed_runs_backwards(s in segment(), t in 0.0..=1.0f64) {
+        let d = s.reversed().eval(t) - s.eval(1.0 - t);
+        prop_assert!(d.hypot2().sqrt() < 1e-9);
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences(s in segment(), t in 0.01..0.99f64) {
+        let h = 1e-5;
+        let (first, second) = s.derivatives(t);
+        let f = (s.eval(t + h) - s.eval(t - h)) / (2.0 * h);
+        let g = (s.derivatives(t + h).0 - s.derivatives(t - h).0) / (2.0 * h);
+        prop_assert!((f - first).hypot2().sqrt() < 1e-3 * (1.0 + first.hypot2().sqrt()));
+        prop_assert!((g - second).hypot2().sqrt() < 1e-3 * (1.0 + second.hypot2().sqrt()));
+    }
+
+    #[test]
+    fn chords_stay_within_the_tolerance(s in segment(), tolerance in 0.01..2.0f64) {
+        let mut from = s.start();
+        let count = s.chord_count(tolerance);
+        let mut k = 0;
+        s.flatten(tolerance, |to| {
+            for i in 0..=8 {
+                let t = (k as f64 + f64::from(i) / 8.0) / count as f64;
+                assert!(distance_to_chord(s.eval(t), from, to) <= tolerance * (1.0 + 1e-9) + 1e-9);
+            }
+            k += 1;
+            from = to;
+        });
+        prop_assert_eq!(k, count);
+    }
+
+    #[test]
+    fn boxes_hold_the_segment_and_touch_it(s in segment()) {
+        let b = s.bounding_box();
+        let mut seen = Rect::from_points(s.start(), s.start());
+        for k in 0..=2000 {
+            let p = s.eval(f64::from(k) / 2000.0);
+            prop_assert!(b.inflate(1e-9, 1e-9).contains(p));
+            seen = seen.union_pt(p);
+        }
+        prop_assert!(b.width() - seen.width() < 0.05 && b.height() - seen.height() < 0.05);
+    }
+
+    #[test]
+    fn length_lies_between_chords_and_bounds(s in segment()) {
+        let n = 4000;
+        let chords: f64 = (0..n)
+            .map(|k| (s.eval(f64::from(k + 1) / f64::from(n)) - s.eval(f64::from(k) / f64::from(n))).hypot2().sqrt())
+            .sum();
+        let length = s.length();
+        prop_assert!(length >= chords - 1e-3 && length <= chords + 1e-2, "{} against {}", length, chords);
+    }
+
+    #[test]
+    fn clipping_keeps_exactly_what_is_inside(s in segment(), a in point(), b in point(), t in 0.0..=1.0f64) {
+        let window = Rect::from_points(a, b);
+        let parts = clip_segment(&s, window);
+        let p = s.eval(t);
+        let kept = parts.iter().any(|&(t0, t1)| t >= t0 && t <= t1);
+        if window.inset(-1e-6).contains(p) != window.inset(1e-6).contains(p) {
+            return Ok(()); // on the edge, within rounding
+        }
+        prop_assert_eq!(kept, window.contains(p), "t {} parts {:?}", t, parts);
+    }
+
+    #[test]
+    fn reversing_a_stroke_twice_is_nothing(list in proptest::collection::vec(segment(), 0..8)) {
+        let mut stroke = Stroke::new(Pen(1), Point::ZERO, Span::default());
+        for s in list {
+            stroke.push(s);
+        }
+        let mut twice = stroke.clone();
+        twice.reverse();
+        let backwards: Vec<Segment> = twice.segments().collect();
+        let forwards: Vec<Segment> = stroke.segments().collect();
+        prop_assert_eq!(backwards.len(), forwards.len());
+        for (x, y) in backwards.iter().rev().zip(&forwards) {
+            prop_assert!((x.eval(0.25) - y.eval(0.75)).hypot2().sqrt() < 1e-9);
+        }
+        twice.reverse();
+        prop_assert!((twice.length() - stroke.length()).abs() < 1e-9 * (1.0 + stroke.length()));
+    }
+}
+
+#[test]
+fn a_circle_that_is_mirrored_and_stretched_is_an_ellipse_run_the_other_way() {
+    let circle = EllipticArc::circular(Point::new(1.0, 2.0), 3.0, 0.0, std::f64::consts::TAU);
+    assert_eq!(circle.circle_radius(), Some(3.0));
+    let ellipse = circle.transformed(Affine::new([-2.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
+    assert_eq!(ellipse.circle_radius(), None);
+    assert_eq!(ellipse.semi_axes(), (6.0, 3.0));
+    let quarter = ellipse.eval(0.25);
+    assert!((quarter - Point::new(-2.0, 5.0)).hypot2() < 1e-20);
+    assert!((quarter.to_vec2() - Vec2::new(-2.0, 5.0)).hypot2() < 1e-20);
+}
+
+#[test]
+fn dots_are_strokes_without_length() {
+    let dot = Stroke::new(Pen(1), Point::new(1.0, 1.0), Span::default());
+    assert!(dot.is_dot());
+    assert_eq!(dot.length(), 0.0);
+    assert_eq!(dot.flatten(0.1), vec![Point::new(1.0, 1.0)]);
+}

@@ -1,0 +1,1 @@
+//! HPGL and HP-GL/2: lexer, parser, interpreter, diagnostics, emitter

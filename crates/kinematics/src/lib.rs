@@ -1,0 +1,1 @@
+//! Machines: geometry, coupling, motors, limits, reach

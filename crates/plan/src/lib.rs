@@ -1,0 +1,67 @@
+//! The joint-space plan as data: a table of motor ticks against time, whole numbers throughout.
+//!
+//! This is what the planner hands over, the verifier replays and the formats write. It knows neither machines nor
+//! drawings nor files. Every machine of plotplan moves a pen in a plane with as many motors as the plane has
+//! dimensions, so a row holds two motor positions.
+
+/// How many motors move the pen: as many as the plane has dimensions, since the coupling is invertible.
+pub const MOTORS: usize = 2;
+
+/// One instant of a plan.
+///
+/// Motors move linearly from each row to the next; `pen` holds from this row to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Time since the plan's start, in whole microseconds; strictly increasing from 0.
+    pub t_us: u64,
+    /// 0 for pen up, otherwise the number of the pen that is down.
+    pub pen: u16,
+    /// Absolute position of each motor, in its own smallest command unit.
+    pub ticks: [i64; MOTORS],
+}
+
+/// The limits that one motor's column obeys.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest speed, ticks/s.
+    pub speed: f64,
+    /// Largest acceleration, ticks/s^2.
+    pub acceleration: f64,
+    /// Largest jerk, ticks/s^3, where the machine states one.
+    pub jerk: Option<f64>,
+}
+
+/// One motor's column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motor {
+    /// The motor's name, which heads its column.
+    pub name: String,
+    /// The limits the plan was made under.
+    pub limits: Limits,
+}
+
+/// What is true of a whole plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// Name of the machine the plan is for.
+    pub machine: String,
+    /// The motors, in the order of the columns.
+    pub motors: [Motor; MOTORS],
+    /// Coefficients `a b c d e f` of the map from drawing mm to machine mm: `x' = a x + c y + e`, `y' = b x + d y + f`.
+    pub placement: [f64; 6],
+    /// Time between rows while anything moves, in whole microseconds.
+    pub period_us: u64,
+    /// How many rows there are.
+    pub rows: u64,
+    /// Time of the last row, in microseconds.
+    pub duration_us: u64,
+}
+
+/// A whole plan in memory, as read back from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TickTable {
+    /// What is true of the whole plan.
+    pub header: Header,
+    /// The rows, in the order of time.
+    pub rows: Vec<Row>,
+}

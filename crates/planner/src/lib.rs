@@ -1,0 +1,1 @@
+//! From strokes to motor ticks against time

@@ -1,0 +1,1 @@
+//! The compiler from pen-plotter drawings to motor motion

@@ -1,0 +1,2 @@
+//! The compiler from pen-plotter drawings to motor motion.
+fn main() {}

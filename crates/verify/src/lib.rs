@@ -1,0 +1,1 @@
+//! Replays a tick table and certifies it, sharing no code with the planner
