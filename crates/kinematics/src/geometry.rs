@@ -1,0 +1,131 @@
+//! The geometries: from joints to the pen and back.
+
+mod cartesian;
+mod polar;
+mod two_link;
+
+use drawing::{Point, Vec2};
+use nalgebra::{Matrix2, Vector2};
+
+pub use cartesian::Cartesian;
+pub use polar::Polar;
+pub use two_link::TwoLink;
+
+/// The two geometric joints, in mm or rad as the geometry says.
+pub type Joints = Vector2<f64>;
+
+/// Why a point has no pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unreachable {
+    /// Further from the base than the arm is long; by so many mm.
+    TooFar(f64),
+    /// Nearer to the base than the arm can fold; by so many mm.
+    TooNear(f64),
+}
+
+/// Shape of a machine: a closed set, one file each, behind one set of functions.
+///
+/// All functions are pure; an inverse takes the branch from the geometry itself (the elbow's side is part of it), so
+/// that it cannot flip while the pen is down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Geometry {
+    /// Joints are x and y, mm.
+    Cartesian(Cartesian),
+    /// Joints are the absolute angles of two links, rad.
+    TwoLink(TwoLink),
+    /// Joints are angle (rad) and radius (mm).
+    Polar(Polar),
+}
+
+macro_rules! each {
+    ($self:expr, $geometry:ident => $call:expr) => {
+        match $self {
+            Geometry::Cartesian($geometry) => $call,
+            Geometry::TwoLink($geometry) => $call,
+            Geometry::Polar($geometry) => $call,
+        }
+    };
+}
+
+impl Geometry {
+    /// Forward kinematics: where the pen is, mm.
+    pub fn forward(&self, q: &Joints) -> Point {
+        each!(self, g => g.forward(q))
+    }
+
+    /// Inverse kinematics: the joints that hold the pen at `p`, angles in (-pi, pi] as they come; see [`Self::turn`].
+    ///
+    /// # Errors
+    /// When no pose reaches the point.
+    pub fn inverse(&self, p: Point) -> Result<Joints, Unreachable> {
+        each!(self, g => g.inverse(p))
+    }
+
+    /// The Jacobian of [`Self::forward`]: columns are the pen's velocity per unit of each joint's.
+    pub fn jacobian(&self, q: &Joints) -> Matrix2<f64> {
+        each!(self, g => g.jacobian(q))
+    }
+
+    /// First and second derivative of the joints along a path on which the pen, at pose `q`, has the derivatives
+    /// `first` (mm) and `second` (mm) by the path's parameter. Infinite or not a number at a singular pose.
+    pub fn path_derivatives(&self, q: &Joints, first: Vec2, second: Vec2) -> (Joints, Joints) {
+        each!(self, g => g.path_derivatives(q, first, second))
+    }
+
+    /// How much the pen's path bends while the joints move evenly from `from` to `to`: a bound on the length of
+    /// d²p/du², u from 0 to 1, mm.
+    ///
+    /// A function whose second derivative is bounded by `B` leaves the chord between its ends by `u (1 - u) B / 2`, so
+    /// by `B / 8` at the most: this is what proves that linear motion of the motors stays on a straight line. `from`
+    /// and `to` may also be (a pose, the pose plus joint speeds): then the bound is that of d²p/dt² at even speed.
+    pub fn bend(&self, from: &Joints, to: &Joints) -> f64 {
+        each!(self, g => g.bend(from, to))
+    }
+
+    /// How far from a singular pose: 0 there, at most 1.
+    pub fn dexterity(&self, q: &Joints) -> f64 {
+        each!(self, g => g.dexterity(q))
+    }
+
+    /// The joints' change over one whole turn of the machine about its base, where that is a thing: the pose is the same.
+    pub fn turn(&self) -> Option<Joints> {
+        let turn = std::f64::consts::TAU;
+        match self {
+            Self::Cartesian(_) => None,
+            Self::TwoLink(_) => Some(Joints::new(turn, turn)),
+            Self::Polar(_) => Some(Joints::new(turn, 0.0)),
+        }
+    }
+
+    /// The joints' names, as machine files and messages use them.
+    pub fn joint_names(&self) -> [&'static str; 2] {
+        match self {
+            Self::Cartesian(_) => ["x", "y"],
+            Self::TwoLink(_) => ["theta", "psi"],
+            Self::Polar(_) => ["phi", "r"],
+        }
+    }
+
+    /// Whether each joint is an angle (rad) rather than a length (mm).
+    pub fn joint_is_angle(&self) -> [bool; 2] {
+        match self {
+            Self::Cartesian(_) => [false, false],
+            Self::TwoLink(_) => [true, true],
+            Self::Polar(_) => [true, false],
+        }
+    }
+
+    /// The centre about which distance decides reach, if there is one: the base of an arm.
+    pub fn base(&self) -> Option<Point> {
+        match self {
+            Self::Cartesian(_) => None,
+            Self::TwoLink(_) | Self::Polar(_) => Some(Point::ZERO),
+        }
+    }
+}
+
+/// The unit vector in direction `angle` (rad) and the one a quarter turn ahead of it.
+fn frame(angle: f64) -> (Vec2, Vec2) {
+    let (sin, cos) = libm::sincos(angle);
+    (Vec2::new(cos, sin), Vec2::new(-sin, cos))
+}

@@ -1,0 +1,90 @@
+//! A planar arm of two links.
+
+use drawing::{Point, Vec2};
+use nalgebra::Matrix2;
+
+use super::{Joints, Unreachable, frame};
+
+/// `q = (theta, psi)`, the **absolute** angles of the first and second link:
+///
+/// ```text
+///            elbow
+///              o
+///     L1    /     \   L2                p = L1 e(theta) + L2 e(psi)
+///        /           \                  beta = psi - theta, the fold at the elbow
+///   base o             pen
+///
+/// r² = x² + y²,  cos beta = (r² - L1² - L2²) / (2 L1 L2),  sin beta = -+ sqrt(1 - cos² beta)
+/// theta = atan2(y, x) - atan2(L2 sin beta, L1 + L2 cos beta),  psi = theta + beta
+/// det J = L1 L2 sin beta
+/// theta' =  v.e(psi)   / (L1 sin beta)
+/// psi'   = -v.e(theta) / (L2 sin beta)
+/// theta'' =  (a.e(psi)   + L1 theta'^2 cos beta + L2 psi'^2) / (L1 sin beta)
+/// psi''   = -(a.e(theta) + L1 theta'^2 + L2 psi'^2 cos beta) / (L2 sin beta)
+/// ```
+/// The elbow on the left of the line from base to pen means beta < 0. Singular when stretched or folded (beta = 0 or
+/// pi). Source: seed 1's report for the position; the derivatives by differentiating `p` twice and solving for the
+/// joints (the tests hold them against differences).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwoLink {
+    /// Length of the first link, mm.
+    pub l1: f64,
+    /// Length of the second link, mm.
+    pub l2: f64,
+    /// Whether the elbow is on the left of the line from base to pen, seen along it.
+    pub elbow_left: bool,
+}
+
+impl TwoLink {
+    pub(super) fn forward(self, q: &Joints) -> Point {
+        (self.l1 * frame(q.x).0 + self.l2 * frame(q.y).0).to_point()
+    }
+
+    pub(super) fn inverse(self, p: Point) -> Result<Joints, Unreachable> {
+        let Self { l1, l2, elbow_left } = self;
+        let r = libm::hypot(p.x, p.y);
+        let (farthest, nearest) = (l1 + l2, (l1 - l2).abs());
+        if r > farthest {
+            return Err(Unreachable::TooFar(r - farthest));
+        }
+        if r < nearest || r == 0.0 {
+            return Err(Unreachable::TooNear(nearest - r));
+        }
+        let cos = ((r * r - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)).clamp(-1.0, 1.0);
+        // 1 - cos² by factors: no cancellation near the stretched pose.
+        let factors = (farthest - r) * (farthest + r) * (r - nearest) * (r + nearest);
+        let size = factors.max(0.0).sqrt() / (2.0 * l1 * l2);
+        let sin = if elbow_left { -size } else { size };
+        let theta = libm::atan2(p.y, p.x) - libm::atan2(l2 * sin, l1 + l2 * cos);
+        Ok(Joints::new(theta, theta + libm::atan2(sin, cos)))
+    }
+
+    pub(super) fn jacobian(self, q: &Joints) -> Matrix2<f64> {
+        let (t1, t2) = (self.l1 * frame(q.x).1, self.l2 * frame(q.y).1);
+        Matrix2::new(t1.x, t2.x, t1.y, t2.y)
+    }
+
+    pub(super) fn path_derivatives(self, q: &Joints, first: Vec2, second: Vec2) -> (Joints, Joints) {
+        let Self { l1, l2, .. } = self;
+        let ((e1, t1), (e2, _)) = (frame(q.x), frame(q.y));
+        // sin and cos of beta from the two directions.
+        let (sin, cos) = (t1.dot(e2), e1.dot(e2));
+        let theta_1 = first.dot(e2) / (l1 * sin);
+        let psi_1 = -first.dot(e1) / (l2 * sin);
+        let (w1, w2) = (l1 * theta_1 * theta_1, l2 * psi_1 * psi_1);
+        let theta_2 = (second.dot(e2) + w1 * cos + w2) / (l1 * sin);
+        let psi_2 = -(second.dot(e1) + w1 + w2 * cos) / (l2 * sin);
+        (Joints::new(theta_1, psi_1), Joints::new(theta_2, psi_2))
+    }
+
+    /// d²p/du² = -L1 theta'^2 e(theta) - L2 psi'^2 e(psi), whatever the coupling.
+    pub(super) fn bend(self, from: &Joints, to: &Joints) -> f64 {
+        let change = to - from;
+        self.l1 * change.x * change.x + self.l2 * change.y * change.y
+    }
+
+    /// |sin beta|.
+    pub(super) fn dexterity(self, q: &Joints) -> f64 {
+        libm::sin(q.y - q.x).abs()
+    }
+}

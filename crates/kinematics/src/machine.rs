@@ -1,0 +1,309 @@
+//! A whole machine: geometry, coupling, motors, limits, pen and sheet.
+
+use drawing::{Point, Rect, Vec2};
+use nalgebra::{Matrix2, Vector2};
+
+use crate::{Coupling, Fault, Geometry, Joints, SingularCoupling};
+
+/// The allowed range of one joint, rad or mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// Smallest allowed value.
+    pub min: f64,
+    /// Largest allowed value.
+    pub max: f64,
+}
+
+impl Joint {
+    /// A joint that may go anywhere.
+    pub const FREE: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY };
+}
+
+/// One motor with its limits, in ticks: the smallest unit in which it is commanded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motor {
+    /// Heads the motor's column in a plan.
+    pub name: String,
+    /// Ticks per unit (rad or mm) of this motor's row of `C q`; negative for a motor that counts the other way.
+    pub counts: f64,
+    /// Ticks where that row is 0.
+    pub offset: f64,
+    /// Largest speed, ticks/s.
+    pub max_speed: f64,
+    /// Largest acceleration, ticks/s².
+    pub max_acceleration: f64,
+    /// Largest jerk, ticks/s³, where the machine states one.
+    pub max_jerk: Option<f64>,
+}
+
+/// What the pen itself allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PenLift {
+    /// Largest speed of the pen over the paper while it draws, mm/s.
+    pub max_speed: f64,
+    /// How long lifting takes, s: the motors stand still.
+    pub lift_time: f64,
+    /// How long lowering takes, s: the motors stand still.
+    pub drop_time: f64,
+}
+
+/// What a machine is made of, before it was checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MachineParts {
+    /// Name of the machine.
+    pub name: String,
+    /// Its shape.
+    pub geometry: Geometry,
+    /// Allowed ranges of the joints.
+    pub joints: [Joint; 2],
+    /// No pen-down pose may have a smaller [`Geometry::dexterity`].
+    pub min_dexterity: f64,
+    /// Rows of the coupling matrix, one a motor.
+    pub coupling: [[f64; 2]; 2],
+    /// The motors.
+    pub motors: [Motor; 2],
+    /// The pen.
+    pub pen: PenLift,
+    /// The sheet in machine mm; its lower-left corner is the drawing's (0, 0) unless told otherwise.
+    pub sheet: Rect,
+    /// The pose in which every plan starts, and ends unless told otherwise.
+    pub start: Joints,
+    /// Time between the rows of a plan, s, unless told otherwise.
+    pub period: f64,
+}
+
+/// Why a machine cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineError {
+    /// See [`SingularCoupling`].
+    #[error(transparent)]
+    Coupling(#[from] SingularCoupling),
+    /// A quantity that must be a positive number is not.
+    #[error("{what} must be a positive number, not {value}")]
+    NotPositive {
+        /// What the quantity is.
+        what: String,
+        /// What it was.
+        value: f64,
+    },
+    /// A quantity is not a finite number, or a range is turned inside out.
+    #[error("{what}")]
+    Invalid {
+        /// What is wrong with what.
+        what: String,
+    },
+    /// A joint of the start pose is outside its own range.
+    #[error("the start pose is not allowed: {fault}")]
+    Start {
+        /// Why.
+        fault: Fault,
+    },
+}
+
+/// A machine that holds together: invertible coupling, positive limits, a start pose inside its joint limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    parts: MachineParts,
+    coupling: Coupling,
+    /// diag(counts) C and its inverse: joints to ticks (less the offset) and back.
+    to_ticks: Matrix2<f64>,
+    from_ticks: Matrix2<f64>,
+    offset: Vector2<f64>,
+}
+
+impl Machine {
+    /// Checks the parts and puts them together.
+    ///
+    /// # Errors
+    /// When the coupling is singular, or a limit, length or time is not a positive finite number, or the start pose
+    /// is outside the joint limits.
+    pub fn new(parts: MachineParts) -> Result<Self, MachineError> {
+        let positive = |what: &str, value: f64| {
+            (value > 0.0 && value.is_finite())
+                .then_some(())
+                .ok_or_else(|| MachineError::NotPositive { what: what.into(), value })
+        };
+        let require = |holds: bool, what: &str| {
+            holds.then_some(()).ok_or_else(|| MachineError::Invalid { what: what.into() })
+        };
+        if let Geometry::TwoLink(arm) = parts.geometry {
+            positive("l1", arm.l1)?;
+            positive("l2", arm.l2)?;
+        }
+        for motor in &parts.motors {
+            let of = |what: &str| format!("{what} of motor {}", motor.name);
+            require(!motor.name.is_empty(), "a motor has no name")?;
+            positive(&of("the size of counts"), motor.counts.abs())?;
+            positive(&of("max_speed"), motor.max_speed)?;
+            positive(&of("max_acceleration"), motor.max_acceleration)?;
+            if let Some(jerk) = motor.max_jerk {
+                positive(&of("max_jerk"), jerk)?;
+            }
+            require(motor.offset.is_finite(), &of("offset must be finite"))?;
+        }
+        require(parts.motors[0].name != parts.motors[1].name, "both motors have the same name")?;
+        positive("the pen's max_speed", parts.pen.max_speed)?;
+        for (what, time) in [("lift_time", parts.pen.lift_time), ("drop_time", parts.pen.drop_time)] {
+            require(
+                (0.0..=3600.0).contains(&time),
+                &format!("the pen's {what} must be between 0 and 3600 s"),
+            )?;
+        }
+        positive("period", parts.period)?;
+        require((1e-6..=10.0).contains(&parts.period), "period must be between 1 us and 10 s")?;
+        require(
+            parts.sheet.is_finite() && parts.sheet.width() > 0.0 && parts.sheet.height() > 0.0,
+            "the sheet must have a positive width and height",
+        )?;
+        require(
+            (0.0..1.0).contains(&parts.min_dexterity),
+            "the smallest dexterity must be from 0 to below 1",
+        )?;
+        for (joint, name) in parts.joints.iter().zip(parts.geometry.joint_names()) {
+            require(joint.min < joint.max, &format!("joint {name}: min must be below max"))?;
+        }
+        let coupling = Coupling::from_rows(parts.coupling)?;
+        let counts = Vector2::new(parts.motors[0].counts, parts.motors[1].counts);
+        let to_ticks = Matrix2::from_diagonal(&counts) * coupling.matrix();
+        let from_ticks =
+            coupling.inverse() * Matrix2::from_diagonal(&Vector2::new(1.0 / counts.x, 1.0 / counts.y));
+        let offset = Vector2::new(parts.motors[0].offset, parts.motors[1].offset);
+        require(parts.start.iter().all(|q| q.is_finite()), "the start pose must be finite")?;
+        let machine = Self { parts, coupling, to_ticks, from_ticks, offset };
+        match machine.joint_fault(&machine.parts.start) {
+            Some(fault) => Err(MachineError::Start { fault }),
+            None => Ok(machine),
+        }
+    }
+
+    /// What it was made of.
+    pub fn parts(&self) -> &MachineParts {
+        &self.parts
+    }
+
+    /// Name of the machine.
+    pub fn name(&self) -> &str {
+        &self.parts.name
+    }
+
+    /// Its shape.
+    pub fn geometry(&self) -> &Geometry {
+        &self.parts.geometry
+    }
+
+    /// Its coupling.
+    pub fn coupling(&self) -> &Coupling {
+        &self.coupling
+    }
+
+    /// Its motors.
+    pub fn motors(&self) -> &[Motor; 2] {
+        &self.parts.motors
+    }
+
+    /// What its pen allows.
+    pub fn pen(&self) -> &PenLift {
+        &self.parts.pen
+    }
+
+    /// The sheet, machine mm.
+    pub fn sheet(&self) -> Rect {
+        self.parts.sheet
+    }
+
+    /// The pose in which plans start.
+    pub fn start(&self) -> Joints {
+        self.parts.start
+    }
+
+    /// Exact motor positions at a pose, in ticks that need not be whole.
+    pub fn ticks(&self, q: &Joints) -> Vector2<f64> {
+        self.to_ticks * q + self.offset
+    }
+
+    /// The pose at which the motors are where they are.
+    pub fn joints(&self, ticks: &Vector2<f64>) -> Joints {
+        self.from_ticks * (ticks - self.offset)
+    }
+
+    /// Joint speeds (or accelerations) as motor speeds, ticks/s for rad/s and mm/s.
+    pub fn motor_rates(&self, joint_rates: &Joints) -> Vector2<f64> {
+        self.to_ticks * joint_rates
+    }
+
+    /// Motor speeds as joint speeds.
+    pub fn joint_rates(&self, motor_rates: &Vector2<f64>) -> Joints {
+        self.from_ticks * motor_rates
+    }
+
+    /// Where the pen is when the motors are at `ticks`, mm.
+    pub fn pen_at(&self, ticks: &Vector2<f64>) -> Point {
+        self.parts.geometry.forward(&self.joints(ticks))
+    }
+
+    /// The pose for the point `p`, unwrapped: of all whole turns the one nearest to `near` that the joint limits allow.
+    ///
+    /// # Errors
+    /// When no allowed pose reaches the point.
+    pub fn pose(&self, p: Point, near: &Joints) -> Result<Joints, Fault> {
+        let q = self.parts.geometry.inverse(p).map_err(Fault::from)?;
+        let Some(turn) = self.parts.geometry.turn() else {
+            return self.joint_fault(&q).map_or(Ok(q), Err);
+        };
+        // The first joint is the one that turns; a turn changes it by 2 pi.
+        let nearest = ((near.x - q.x) / turn.x).round();
+        let mut fault = None;
+        for extra in [0.0, -1.0, 1.0] {
+            let candidate = q + turn * (nearest + extra);
+            match self.joint_fault(&candidate) {
+                None => return Ok(candidate),
+                Some(found) => fault = fault.or(Some(found)),
+            }
+        }
+        // Far from `near` the range itself says where to look.
+        let middle = 0.5 * (self.parts.joints[0].min + self.parts.joints[0].max);
+        if middle.is_finite() {
+            let candidate = q + turn * ((middle - q.x) / turn.x).round();
+            if self.joint_fault(&candidate).is_none() {
+                return Ok(candidate);
+            }
+        }
+        Err(fault.unwrap_or(Fault::Singular { dexterity: 0.0, min: self.parts.min_dexterity }))
+    }
+
+    /// First and second derivative of the motors' positions (ticks) along a path on which the pen, at pose `q`, has
+    /// the derivatives `first` and `second`.
+    pub fn motor_derivatives(&self, q: &Joints, first: Vec2, second: Vec2) -> (Vector2<f64>, Vector2<f64>) {
+        let (q_1, q_2) = self.parts.geometry.path_derivatives(q, first, second);
+        (self.to_ticks * q_1, self.to_ticks * q_2)
+    }
+
+    /// How far the pen can be from where it should be because motors only take whole ticks: the largest displacement
+    /// over half a tick more or less on both motors, mm.
+    pub fn tick_floor(&self, q: &Joints) -> f64 {
+        let exact = self.parts.geometry.forward(q);
+        [(0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)]
+            .into_iter()
+            .map(|(a, b)| {
+                let moved = self.parts.geometry.forward(&(q + self.from_ticks * Vector2::new(a, b)));
+                libm::hypot(moved.x - exact.x, moved.y - exact.y)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// The joint of `q` that is outside its range, if one is. A rounding error of 1e-9 is forgiven.
+    pub fn joint_fault(&self, q: &Joints) -> Option<Fault> {
+        let names = self.parts.geometry.joint_names();
+        (0..2).find_map(|index| {
+            let (joint, value) = (self.parts.joints[index], q[index]);
+            let allowed = value >= joint.min - 1e-9 && value <= joint.max + 1e-9;
+            (!allowed).then(|| Fault::JointLimit {
+                joint: names[index],
+                angle: self.parts.geometry.joint_is_angle()[index],
+                value,
+                min: joint.min,
+                max: joint.max,
+            })
+        })
+    }
+}
