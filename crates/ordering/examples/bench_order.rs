@@ -1,0 +1,55 @@
+//! Orders the drawings of a benchmark and prints the travel: `bench_order [--effort N] [--merge] FILE.hpgl …`
+//!
+//! Reads only what the generator of the benchmark writes: `SP`, `PUx,y` and `PDx,y,…` in plotter units of 0.025 mm.
+
+#![allow(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a benchmark prints, and reads the clock"
+)]
+
+use drawing::{Drawing, Pen, Point, Span, Stroke};
+use ordering::{Options, distance, optimize};
+
+fn read(text: &str) -> Drawing {
+    let mut strokes = Vec::new();
+    let mut at = Vec::new();
+    for command in text.split(';').map(str::trim) {
+        let (name, rest) = command.split_at(command.len().min(2));
+        let numbers: Vec<f64> = rest.split(',').filter_map(|number| number.parse().ok()).collect();
+        let points = numbers.chunks_exact(2).map(|p| Point::new(p[0] * 0.025, p[1] * 0.025));
+        match name {
+            "PU" => at = points.collect(),
+            "PD" => {
+                let stroke = Stroke::polyline(Pen(1), at.drain(..).chain(points).collect(), Span::default());
+                strokes.extend(stroke);
+            }
+            _ => {}
+        }
+    }
+    Drawing { strokes }
+}
+
+fn main() {
+    let mut options = Options { merge: false, ..Options::default() };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--effort" => options.effort = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(2),
+            "--merge" => options.merge = true,
+            file => {
+                let drawing = read(&std::fs::read_to_string(file).unwrap_or_default());
+                let begin = std::time::Instant::now();
+                let (_, report) = optimize(drawing, &distance, &options);
+                println!(
+                    "{file}: {} -> {} strokes, travel {:.1} -> {:.1} mm, {:.2} s",
+                    report.strokes_before,
+                    report.strokes_after,
+                    report.travel_mm_before,
+                    report.travel_mm_after,
+                    begin.elapsed().as_secs_f64()
+                );
+            }
+        }
+    }
+}

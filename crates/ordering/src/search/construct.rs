@@ -1,0 +1,121 @@
+//! Tours to start from: nearest neighbour and greedy edge.
+
+use super::problem::{End, Problem, mate};
+use super::tree::Tree;
+
+const UNLINKED: End = End::MAX;
+
+/// The trees an end finds its partners in: all ends, or for strokes that may not be reversed those of the other
+/// parity.
+pub(crate) struct Partners {
+    trees: Vec<Tree>,
+    one_way: bool,
+}
+
+impl Partners {
+    pub(crate) fn new(problem: &Problem, ends: &[End]) -> Self {
+        let of_parity =
+            |parity| Tree::new(problem, ends.iter().copied().filter(move |&end| end % 2 == parity));
+        let trees = if problem.one_way {
+            vec![of_parity(1), of_parity(0)]
+        } else {
+            vec![Tree::new(problem, ends.iter().copied())]
+        };
+        Self { trees, one_way: problem.one_way }
+    }
+
+    pub(crate) fn of(&self, end: End) -> &Tree {
+        &self.trees[if self.one_way { end as usize % 2 } else { 0 }]
+    }
+
+    fn remove(&mut self, end: End) {
+        for tree in &mut self.trees {
+            tree.remove(end);
+        }
+    }
+}
+
+/// From the depot always to the nearest end (in the plane) of a stroke not yet drawn. Best on hatches.
+///
+/// When the start is free, it starts with the first stroke of the file.
+pub(crate) fn nearest_neighbour(problem: &Problem) -> Vec<End> {
+    let ends: Vec<End> = (2..problem.end_count() as End).collect();
+    let mut partners = Partners::new(problem, &ends);
+    let mut tour = Vec::with_capacity(problem.stroke_count());
+    tour.push(0);
+    let mut found = Vec::with_capacity(1);
+    while tour.len() < problem.stroke_count() {
+        let from = mate(tour[tour.len() - 1]);
+        let entry = if problem.is_placed(from) {
+            partners.of(from).nearest(problem.point(from), 1, [from; 2], &mut found);
+            found.first().map(|&(_, end)| end)
+        } else {
+            Some(2)
+        };
+        let Some(entry) = entry else { break };
+        tour.push(entry);
+        partners.remove(entry);
+        partners.remove(mate(entry));
+    }
+    tour
+}
+
+/// The cheapest moves first, as long as they close no circle. Best on lettering and scattered strokes.
+///
+/// Candidates are the ends nearest in the plane; what is joined becomes one stroke, and the ends that are left over
+/// look for candidates among themselves, until one is left. Every round at the least joins the cheapest candidate.
+pub(crate) fn greedy_edge(problem: &Problem) -> Vec<End> {
+    const CANDIDATES: usize = 6;
+    let count = problem.end_count() as End;
+    let mut link = vec![UNLINKED; count as usize];
+    // The other end of the fragment that an open end belongs to.
+    let mut opposite: Vec<End> = (0..count).map(mate).collect();
+    let mut found = Vec::with_capacity(CANDIDATES);
+    loop {
+        let open: Vec<End> = (0..count).filter(|&end| link[end as usize] == UNLINKED).collect();
+        let partners = Partners::new(problem, &open);
+        let mut moves: Vec<(f64, End, End)> = Vec::with_capacity(open.len() * CANDIDATES);
+        for &end in open.iter().filter(|&&end| problem.is_placed(end)) {
+            let but = [end, opposite[end as usize]];
+            partners.of(end).nearest(problem.point(end), CANDIDATES, but, &mut found);
+            moves.extend(found.iter().map(|&(_, to)| (problem.cost(end, to), end.min(to), end.max(to))));
+        }
+        moves.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let mut joined = false;
+        for (_, a, b) in moves {
+            let (a_at, b_at) = (a as usize, b as usize);
+            if link[a_at] == UNLINKED && link[b_at] == UNLINKED && opposite[a_at] != b {
+                (link[a_at], link[b_at]) = (b, a);
+                let (a_far, b_far) = (opposite[a_at], opposite[b_at]);
+                (opposite[a_far as usize], opposite[b_far as usize]) = (b_far, a_far);
+                joined = true;
+            }
+        }
+        if !joined {
+            return close(problem, &mut link, &opposite);
+        }
+    }
+}
+
+/// Walks the fragments into a tour: one is left, or two when the depot has no place and the joining passed it by.
+fn close(problem: &Problem, link: &mut [End], opposite: &[End]) -> Vec<End> {
+    let open: Vec<End> = (0..link.len() as End).filter(|&end| link[end as usize] == UNLINKED).collect();
+    // `one_way`: the last fragment begins with an even end and ends with an odd one, as the depot does.
+    if let Some(&first) = open.iter().find(|&&end| end > 1 && (!problem.one_way || end % 2 == 0)) {
+        let last = opposite[first as usize];
+        let (leave, arrive) = if last < 2 || open.len() == 2 { (last, first) } else { (1, first) };
+        (link[leave as usize], link[arrive as usize]) = (arrive, leave);
+        if open.len() > 2 {
+            (link[last as usize], link[0]) = (0, last);
+        }
+    }
+    let mut tour = vec![0];
+    while tour.len() < problem.stroke_count() {
+        let entry = link[mate(tour[tour.len() - 1]) as usize];
+        if entry == UNLINKED || entry < 2 {
+            break;
+        }
+        tour.push(entry);
+    }
+    tour
+}

@@ -1,0 +1,93 @@
+//! What is searched: strokes reduced to their two ends, and a depot.
+
+use drawing::Point;
+
+use crate::Cost;
+
+/// One end of a stroke: stroke `s` has the ends `2s` and `2s + 1`, so that the other end of `e` is `e ^ 1`.
+pub(crate) type End = u32;
+
+/// The other end of the same stroke.
+pub(crate) fn mate(end: End) -> End {
+    end ^ 1
+}
+
+/// Strokes by their ends, and what a pen-up move between two ends costs.
+///
+/// An open path is a closed tour through one more stroke, the **depot** (number 0): the pen leaves it by its end 1,
+/// where it starts, and comes back to its end 0, where it parks. An end of the depot that has no place costs nothing
+/// to reach. So one search serves paths that are free at both ends, bound to a start, to a park position, or both.
+pub(crate) struct Problem<'a> {
+    points: Vec<Point>,
+    placed: [bool; 2],
+    /// Strokes may not be reversed: a move goes from an odd end to an even one, never otherwise.
+    pub(crate) one_way: bool,
+    cost: &'a dyn Cost,
+}
+
+impl<'a> Problem<'a> {
+    /// `strokes` are the ends of the strokes as the file has them; they become the strokes 1, 2, ….
+    pub(crate) fn new(
+        strokes: impl Iterator<Item = [Point; 2]>,
+        start: Option<Point>,
+        park: Option<Point>,
+        one_way: bool,
+        cost: &'a dyn Cost,
+    ) -> Self {
+        let mut points = vec![park.unwrap_or_default(), start.unwrap_or_default()];
+        points.extend(strokes.flatten());
+        Self { points, placed: [park.is_some(), start.is_some()], one_way, cost }
+    }
+
+
+    /// How many strokes there are, the depot included.
+    pub(crate) fn stroke_count(&self) -> usize {
+        self.points.len() / 2
+    }
+
+    /// How many ends there are, those of the depot included.
+    pub(crate) fn end_count(&self) -> usize {
+        self.points.len()
+    }
+
+    pub(crate) fn point(&self, end: End) -> Point {
+        self.points[end as usize]
+    }
+
+    /// Whether an end is anywhere: all are, but for those of a depot without a place.
+    pub(crate) fn is_placed(&self, end: End) -> bool {
+        end > 1 || self.placed[end as usize]
+    }
+
+    /// What the pen-up move between two ends costs, in the unit of the cost function.
+    pub(crate) fn cost(&self, a: End, b: End) -> f64 {
+        if self.is_placed(a) && self.is_placed(b) {
+            self.cost.between(self.point(a), self.point(b))
+        } else {
+            0.0
+        }
+    }
+
+    /// The tour as the file has it.
+    pub(crate) fn file_order(&self) -> Vec<End> {
+        (0..self.end_count() as End).step_by(2).collect()
+    }
+
+    /// The cost of a tour, given as the ends by which its strokes are entered.
+    pub(crate) fn tour_cost(&self, tour: &[End]) -> f64 {
+        let next = tour.iter().cycle().skip(1);
+        tour.iter().zip(next).map(|(&from, &to)| self.cost(mate(from), to)).sum()
+    }
+
+    /// Turns a tour so that it begins with the depot, entered where the pen parks and left where it starts.
+    pub(crate) fn canonical(&self, tour: &mut [End]) {
+        let Some(at) = tour.iter().position(|&end| end < 2) else { return };
+        tour.rotate_left(at);
+        if tour[0] == 1 {
+            tour[1..].reverse();
+            for end in tour {
+                *end = mate(*end);
+            }
+        }
+    }
+}
