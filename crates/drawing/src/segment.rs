@@ -153,7 +153,7 @@ pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64
         if arc.sweep < 0.0 { (arc.start + arc.sweep, arc.start) } else { (arc.start, arc.start + arc.sweep) };
     let first = ((low - base) / every).ceil();
     let last = ((high - base) / every).floor();
-    if !(last >= first) {
+    if last < first || (last - first).is_nan() {
         return Vec::new();
     }
     // More than a turn says nothing new.

@@ -3,7 +3,7 @@
 use drawing::{Point, Rect, Vec2};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::{Coupling, Fault, Geometry, Joints, SingularCoupling};
+use crate::{Coupling, Fault, Geometry, Joints, SingularCoupling, Unreachable};
 
 /// The allowed range of one joint, rad or mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -241,34 +241,41 @@ impl Machine {
         self.parts.geometry.forward(&self.joints(ticks))
     }
 
-    /// The pose for the point `p`, unwrapped: of all whole turns the one nearest to `near` that the joint limits allow.
+    /// The pose for the point `p`, unwrapped: of all whole turns about the base the one nearest to `near`. Joint limits
+    /// are not looked at.
     ///
     /// # Errors
-    /// When no allowed pose reaches the point.
-    pub fn pose(&self, p: Point, near: &Joints) -> Result<Joints, Fault> {
-        let q = self.parts.geometry.inverse(p).map_err(Fault::from)?;
-        let Some(turn) = self.parts.geometry.turn() else {
-            return self.joint_fault(&q).map_or(Ok(q), Err);
-        };
-        // The first joint is the one that turns; a turn changes it by 2 pi.
-        let nearest = ((near.x - q.x) / turn.x).round();
+    /// When no pose reaches the point.
+    pub fn pose_near(&self, p: Point, near: &Joints) -> Result<Joints, Unreachable> {
+        let q = self.parts.geometry.inverse(p)?;
+        Ok(match self.parts.geometry.turn() {
+            // The first joint is one that turns.
+            Some(turn) => q + turn * ((near.x - q.x) / turn.x).round(),
+            None => q,
+        })
+    }
+
+    /// The poses for the point `p` that the joint limits allow, the one nearest to `near` first.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn poses(&self, p: Point, near: &Joints) -> Result<Vec<Joints>, Fault> {
+        let nearest = self.pose_near(p, near)?;
+        let mut allowed = Vec::new();
         let mut fault = None;
-        for extra in [0.0, -1.0, 1.0] {
-            let candidate = q + turn * (nearest + extra);
+        let turns: &[f64] =
+            if self.parts.geometry.turn().is_some() { &[0.0, -1.0, 1.0, -2.0, 2.0] } else { &[0.0] };
+        for extra in turns {
+            let candidate = nearest + self.parts.geometry.turn().unwrap_or_default() * *extra;
             match self.joint_fault(&candidate) {
-                None => return Ok(candidate),
+                None => allowed.push(candidate),
                 Some(found) => fault = fault.or(Some(found)),
             }
         }
-        // Far from `near` the range itself says where to look.
-        let middle = 0.5 * (self.parts.joints[0].min + self.parts.joints[0].max);
-        if middle.is_finite() {
-            let candidate = q + turn * ((middle - q.x) / turn.x).round();
-            if self.joint_fault(&candidate).is_none() {
-                return Ok(candidate);
-            }
+        match (allowed.is_empty(), fault) {
+            (true, Some(fault)) => Err(fault),
+            _ => Ok(allowed),
         }
-        Err(fault.unwrap_or(Fault::Singular { dexterity: 0.0, min: self.parts.min_dexterity }))
     }
 
     /// First and second derivative of the motors' positions (ticks) along a path on which the pen, at pose `q`, has

@@ -82,9 +82,9 @@ impl Machine {
     /// # Errors
     /// When it may not.
     pub fn check_point(&self, p: Point) -> Result<(), OutOfReach> {
-        let fault = match self.pose(p, &self.start()) {
-            Ok(q) => {
-                let (dexterity, min) = (self.geometry().dexterity(&q), self.parts().min_dexterity);
+        let fault = match self.poses(p, &self.start()) {
+            Ok(poses) => {
+                let (dexterity, min) = (self.geometry().dexterity(&poses[0]), self.parts().min_dexterity);
                 (dexterity < min).then_some(Fault::Singular { dexterity, min })
             }
             Err(fault) => Some(fault),
