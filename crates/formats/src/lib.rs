@@ -37,11 +37,15 @@ pub mod csv;
 mod error;
 mod header;
 pub mod json;
-pub mod ticks;
-
+mod palette;
+pub mod png;
+pub mod preview;
 mod sniff;
+pub mod svg;
 mod text;
+pub mod ticks;
 
 pub use error::{HeaderError, ReadError, RowsError, WriteError};
 pub use header::check_header;
+pub use preview::{Ink, Scene};
 pub use sniff::{PlanFile, PlanFormat, looks_like_plan, read_plan};

@@ -41,6 +41,19 @@ impl<'w, W: Write + ?Sized> Text<'w, W> {
         self.str(if plain.len() <= scientific.len() { &plain } else { &scientific })
     }
 
+    /// The number with exactly three decimals, 0.000 for everything that rounds to it and for what is no number.
+    pub(crate) fn fixed(&mut self, number: f64) -> &mut Self {
+        let thousandths = (number * 1000.0).round() as i64;
+        if thousandths < 0 {
+            self.byte(b'-');
+        }
+        let thousandths = thousandths.unsigned_abs();
+        self.int(thousandths / 1000).byte(b'.');
+        let decimals = (thousandths % 1000) as u16;
+        self.byte(b'0' + (decimals / 100) as u8).byte(b'0' + (decimals / 10 % 10) as u8);
+        self.byte(b'0' + (decimals % 10) as u8)
+    }
+
     /// How much stands in the block: a mark to measure a line's length from.
     pub(crate) fn mark(&self) -> usize {
         self.block.len()
