@@ -3,7 +3,7 @@
 use drawing::{Point, Rect, Vec2};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::{Coupling, Fault, Geometry, Joints, SingularCoupling, Unreachable};
+use crate::{Coupling, Fault, Geometry, Joints, SingularCoupling, Unreachable, reach::CHORD_TOLERANCE};
 
 /// The allowed range of one joint, rad or mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -300,10 +300,21 @@ impl Machine {
 
     /// The joint of `q` that is outside its range, if one is. A rounding error of 1e-9 is forgiven.
     pub fn joint_fault(&self, q: &Joints) -> Option<Fault> {
+        self.joint_fault_beyond(q, [1e-9, 1e-9])
+    }
+
+    /// The same for points between those that [`Self::check_segment`] looked at: curves are checked as chords, so a joint
+    /// may exceed its range there by what a curve leaves its chord by, seen from no nearer than 10 mm.
+    pub fn joint_fault_between(&self, q: &Joints) -> Option<Fault> {
+        let angles = self.parts.geometry.joint_is_angle();
+        self.joint_fault_beyond(q, angles.map(|angle| if angle { CHORD_TOLERANCE / 10.0 } else { CHORD_TOLERANCE }))
+    }
+
+    fn joint_fault_beyond(&self, q: &Joints, slack: [f64; 2]) -> Option<Fault> {
         let names = self.parts.geometry.joint_names();
         (0..2).find_map(|index| {
             let (joint, value) = (self.parts.joints[index], q[index]);
-            let allowed = value >= joint.min - 1e-9 && value <= joint.max + 1e-9;
+            let allowed = value >= joint.min - slack[index] && value <= joint.max + slack[index];
             (!allowed).then(|| Fault::JointLimit {
                 joint: names[index],
                 angle: self.parts.geometry.joint_is_angle()[index],

@@ -74,7 +74,7 @@ pub struct OutOfReach {
 }
 
 /// Curves are checked as chords that stay this close to them, mm; far below any machine's tick.
-const CHORD_TOLERANCE: f64 = 1e-3;
+pub(crate) const CHORD_TOLERANCE: f64 = 1e-3;
 
 impl Machine {
     /// Whether the pen may draw at `p`: reachable, inside the joint limits, not too near to a singular pose.
@@ -82,12 +82,20 @@ impl Machine {
     /// # Errors
     /// When it may not.
     pub fn check_point(&self, p: Point) -> Result<(), OutOfReach> {
-        let fault = match self.poses(p, &self.start()) {
-            Ok(poses) => {
-                let (dexterity, min) = (self.geometry().dexterity(&poses[0]), self.parts().min_dexterity);
-                (dexterity < min).then_some(Fault::Singular { dexterity, min })
-            }
+        let pose = self.pose_near(p, &self.start()).map_err(Fault::from);
+        // Whether the pose is nearly singular is the same after any number of turns; the joint limits are not.
+        let fault = match pose {
             Err(fault) => Some(fault),
+            Ok(q) => {
+                let (dexterity, min) = (self.geometry().dexterity(&q), self.parts().min_dexterity);
+                if dexterity < min {
+                    Some(Fault::Singular { dexterity, min })
+                } else if self.joint_fault(&q).is_some() {
+                    self.poses(p, &self.start()).err()
+                } else {
+                    None
+                }
+            }
         };
         fault.map_or(Ok(()), |fault| Err(OutOfReach { point: p, fault }))
     }

@@ -1,0 +1,69 @@
+//! Machines for the planner's tests, by hand: the shapes of the four seeds with round numbers.
+
+use drawing::Rect;
+use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar, TwoLink};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+pub fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
+    Motor { name: name.into(), counts, offset, max_speed, max_acceleration, max_jerk: None }
+}
+
+fn build(
+    geometry: Geometry,
+    joints: [Joint; 2],
+    coupling: [[f64; 2]; 2],
+    motors: [Motor; 2],
+    sheet: Rect,
+    start: Joints,
+) -> Machine {
+    Machine::new(MachineParts {
+        name: "test".into(),
+        geometry,
+        joints,
+        min_dexterity: if matches!(geometry, Geometry::TwoLink(_)) { 0.1 } else { 0.0 },
+        coupling,
+        motors,
+        pen: PenLift { max_speed: 60.0, lift_time: 0.12, drop_time: 0.15 },
+        sheet,
+        start,
+        period: 0.01,
+    })
+    .unwrap()
+}
+
+pub fn arm() -> Machine {
+    let counts = 3200.0 / TAU;
+    build(
+        Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
+        [Joint::FREE, Joint::FREE],
+        [[1.0, 0.0], [0.0, -1.0]],
+        [motor("arm1", counts, 0.0, 533.0, 2667.0), motor("arm2", counts, 800.0, 533.0, 2667.0)],
+        Rect::new(12.7, 76.2, 228.6, 355.6),
+        Joints::new(FRAC_PI_2, FRAC_PI_2),
+    )
+}
+
+pub fn corexy() -> Machine {
+    build(
+        Geometry::Cartesian(Cartesian),
+        [Joint { min: 0.0, max: 200.0 }, Joint { min: 0.0, max: 200.0 }],
+        [[1.0, 1.0], [1.0, -1.0]],
+        [motor("a", 92.0, 0.0, 4000.0, 30000.0), motor("b", 92.0, 0.0, 4000.0, 30000.0)],
+        Rect::new(0.0, 0.0, 200.0, 200.0),
+        Joints::new(0.0, 0.0),
+    )
+}
+
+pub fn polar() -> Machine {
+    build(
+        Geometry::Polar(Polar),
+        [Joint { min: 0.0, max: PI }, Joint { min: 48.0, max: 138.0 }],
+        [[-1.0, 0.0], [0.0, 1.0]],
+        [
+            motor("theta", 1856.0 / PI, 2400.0, 1000.0, 6000.0),
+            motor("r", 360.0 / 44.0, -138.0 * 360.0 / 44.0, 360.0, 3600.0),
+        ],
+        Rect::new(-138.0, 0.0, 138.0, 138.0),
+        Joints::new(FRAC_PI_2, 138.0),
+    )
+}

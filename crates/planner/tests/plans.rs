@@ -1,0 +1,275 @@
+//! Properties of whole plans: limits and tolerance hold in the emitted rows, whatever the drawing and the machine.
+
+use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
+use kinematics::{Joints, Machine};
+use planner::placement::{Size, Wish, place};
+use planner::{ExactRow, PlanError, Settings, plan};
+use proptest::prelude::*;
+
+mod machines;
+
+fn machine() -> impl Strategy<Value = Machine> {
+    prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())]
+}
+
+/// Strokes inside the unit square: polylines, circles and ellipses, cubics, dots.
+fn stroke() -> impl Strategy<Value = Stroke> {
+    let point = || (0.0..1.0f64, 0.0..1.0f64).prop_map(|(x, y)| Point::new(x, y));
+    let fine = (point(), 0.0..6.2f64, proptest::collection::vec(-0.4..0.4f64, 1..40)).prop_map(
+        |(start, turn, turns)| {
+            let (mut at, mut angle) = (start, turn);
+            let mut points = vec![start];
+            for bend in turns {
+                angle += bend;
+                at = Point::new(
+                    (at.x + 0.004 * libm::cos(angle)).clamp(0.0, 1.0),
+                    (at.y + 0.004 * libm::sin(angle)).clamp(0.0, 1.0),
+                );
+                points.push(at);
+            }
+            Stroke::polyline(Pen(1), points, Span::default()).unwrap()
+        },
+    );
+    prop_oneof![
+        proptest::collection::vec(point(), 1..8).prop_map(|points| Stroke::polyline(
+            Pen(1),
+            points,
+            Span::default()
+        )
+        .unwrap()),
+        fine,
+        (point(), 0.001..0.3f64, -7.0..7.0f64, -6.2..6.2f64).prop_map(|(c, r, start, sweep)| {
+            let c = Point::new(c.x.clamp(r, 1.0 - r), c.y.clamp(r, 1.0 - r));
+            let arc = EllipticArc::circular(c, r, start, sweep)
+                .transformed(Affine::new([1.0, 0.0, 0.0, 0.4, 0.0, 0.0]));
+            let mut stroke = Stroke::new(Pen(2), arc.eval(0.0), Span::default());
+            stroke.arc(arc);
+            stroke
+        }),
+        (point(), point(), point(), point()).prop_map(|(a, b, c, d)| {
+            let mut stroke = Stroke::new(Pen(3), a, Span::default());
+            stroke.cubic_to(b, c, d);
+            stroke
+        }),
+    ]
+}
+
+fn drawing() -> impl Strategy<Value = Drawing> {
+    proptest::collection::vec(stroke(), 1..4).prop_map(|strokes| Drawing { strokes })
+}
+
+fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {
+    let wish = Wish { rotate: 0.0, size: Size::Fit };
+    let mut placed = drawing.clone();
+    placed.transform(place(machine, drawing, &wish).unwrap());
+    placed
+}
+
+/// Rows with the pauses filled in, so that all are one period apart.
+fn filled(rows: &[ExactRow], period_us: u64) -> Vec<[f64; 2]> {
+    let mut all = vec![rows[0].exact; 2];
+    for pair in rows.windows(2) {
+        let periods = (pair[1].row.t_us - pair[0].row.t_us) / period_us;
+        assert_eq!((pair[1].row.t_us - pair[0].row.t_us) % period_us, 0);
+        if periods > 1 {
+            assert_eq!(pair[0].row.ticks, pair[1].row.ticks, "rows are only thinned where nothing moves");
+        }
+        for _ in 1..periods {
+            all.push(pair[0].exact);
+        }
+        all.push(pair[1].exact);
+    }
+    all.extend([*all.last().unwrap(); 2]);
+    all
+}
+
+fn distance(p: Point, a: Point, b: Point) -> f64 {
+    let (d, v) = (b - a, p - a);
+    let t = if d.hypot2() > 0.0 { (v.dot(d) / d.hypot2()).clamp(0.0, 1.0) } else { 0.0 };
+    (v - t * d).hypot2().sqrt()
+}
+
+fn to_polyline(p: Point, line: &[Point]) -> f64 {
+    if line.len() == 1 {
+        return distance(p, line[0], line[0]);
+    }
+    line.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    /// |first difference| <= v T and |second difference| <= a T² in the exact positions of every row, and the pen's
+    /// continuous path within the tolerance of the drawing, both ways.
+    #[test]
+    fn limits_and_tolerance_hold(
+        machine in machine(), drawing in drawing(),
+        tolerance in prop_oneof![Just(0.1), 0.005..1.0f64],
+        period_us in prop_oneof![Just(10_000u64), 500..60_000u64],
+    ) {
+        let placed = fitted(&machine, &drawing);
+        let settings = Settings { tolerance, period_us, park: None };
+        let trajectory = plan(&machine, &placed, &settings).unwrap();
+        let rows: Vec<ExactRow> = trajectory.rows().collect();
+        let period = period_us as f64 * 1e-6;
+
+        let (first, last) = (rows.first().unwrap().row, rows.last().unwrap().row);
+        let start = machine.ticks(&machine.start());
+        prop_assert_eq!(first.ticks, [start.x.round() as i64, start.y.round() as i64]);
+        prop_assert_eq!(last.ticks, first.ticks);
+        prop_assert_eq!((first.t_us, first.pen, last.pen), (0, 0, 0));
+        prop_assert_eq!(last.t_us, trajectory.duration_us());
+        prop_assert!(rows.windows(2).all(|w| w[1].row.t_us > w[0].row.t_us));
+
+        let all = filled(&rows, period_us);
+        for (k, motor) in machine.motors().iter().enumerate() {
+            for w in all.windows(3) {
+                let speed = (w[1][k] - w[0][k]).abs() / period;
+                let acceleration = (w[2][k] - 2.0 * w[1][k] + w[0][k]).abs() / (period * period);
+                prop_assert!(speed <= motor.max_speed * (1.0 + 1e-6) + 1e-6 / period, "speed {} of {}", speed, motor.max_speed);
+                prop_assert!(
+                    acceleration <= motor.max_acceleration * (1.0 + 1e-6) + 1e-6 / (period * period),
+                    "acceleration {} of {}", acceleration, motor.max_acceleration
+                );
+            }
+        }
+
+        // Ink by stroke: from a pen-down row to the next pen-up row.
+        let mut strokes = placed.strokes.iter();
+        let mut ink: Vec<Point> = Vec::new();
+        for pair in rows.windows(2) {
+            let at = |row: &ExactRow, other: &ExactRow, u: f64| {
+                let (a, b) = (Joints::from(row.exact), Joints::from(other.exact));
+                machine.pen_at(&(a + u * (b - a)))
+            };
+            if pair[0].row.pen > 0 {
+                ink.extend((0..=4).map(|k| at(&pair[0], &pair[1], f64::from(k) / 4.0)));
+            } else if !ink.is_empty() {
+                let stroke = strokes.next().unwrap();
+                let line = stroke.flatten(tolerance / 100.0);
+                for p in &ink {
+                    let off = to_polyline(*p, &line);
+                    prop_assert!(off <= tolerance * 1.011, "ink {} strays by {}", p, off);
+                }
+                for segment in stroke.segments() {
+                    for k in 0..=10 {
+                        let p: Point = Segment::eval(&segment, f64::from(k) / 10.0);
+                        let off = to_polyline(p, &ink);
+                        prop_assert!(off <= tolerance * 1.001, "{} is missed by {}", p, off);
+                    }
+                }
+                ink.clear();
+            }
+        }
+        prop_assert!(strokes.next().is_none(), "every stroke is drawn");
+    }
+}
+
+fn settings() -> Settings {
+    Settings { tolerance: 0.1, period_us: 10_000, park: None }
+}
+
+fn line(points: &[(f64, f64)]) -> Drawing {
+    let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
+    Drawing { strokes: vec![Stroke::polyline(Pen(1), points, Span { start: 7, end: 19 }).unwrap()] }
+}
+
+#[test]
+fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
+    let machine = machines::corexy();
+    let mut parts = machine.parts().clone();
+    parts.pen.max_speed = 1e9;
+    let machine = Machine::new(parts).unwrap();
+    // Along x both motors turn by 92 ticks/mm: v = 4000/92 mm/s, a = 30000/92 mm/s², T = d/v + v/a.
+    let trajectory = plan(&machine, &line(&[(10.0, 10.0), (110.0, 10.0)]), &settings()).unwrap();
+    let (v, a) = (4000.0 / 92.0, 30000.0 / 92.0);
+    let exact = 100.0 / v + v / a;
+    assert!(trajectory.times().drawing >= exact && trajectory.times().drawing < exact + 0.011);
+}
+
+#[test]
+fn the_pen_rests_for_the_whole_of_every_lift_and_drop() {
+    let machine = machines::arm();
+    let trajectory = plan(&machine, &line(&[(50.0, 200.0), (60.0, 210.0)]), &settings()).unwrap();
+    let rows: Vec<ExactRow> = trajectory.rows().collect();
+    let down = rows.iter().position(|row| row.row.pen == 1).unwrap();
+    assert_eq!(rows[down + 1].row.t_us - rows[down].row.t_us, 150_000);
+    assert_eq!(rows[down + 1].row.ticks, rows[down].row.ticks);
+    let up = down + rows[down..].iter().position(|row| row.row.pen == 0).unwrap();
+    assert_eq!(rows[up + 1].row.t_us - rows[up].row.t_us, 120_000);
+    assert_eq!(rows[up + 1].row.ticks, rows[up].row.ticks);
+}
+
+#[test]
+fn a_dot_is_a_pen_that_goes_down_and_up() {
+    let machine = machines::corexy();
+    let trajectory = plan(&machine, &line(&[(50.0, 20.0)]), &settings()).unwrap();
+    let down: Vec<ExactRow> = trajectory.rows().filter(|row| row.row.pen == 1).collect();
+    assert_eq!(down.len(), 1);
+    assert_eq!(down[0].row.ticks, [70 * 92, 30 * 92]);
+}
+
+#[test]
+fn a_stroke_that_leaves_the_reach_is_named_with_its_place() {
+    let machine = machines::polar();
+    let error = plan(&machine, &line(&[(-60.0, 20.0), (60.0, 20.0)]), &settings()).unwrap_err();
+    let PlanError::OutOfReach { stroke, span, source, .. } = error else { panic!("{error}") };
+    assert_eq!((stroke, span.start), (0, 7));
+    assert_eq!(source.point, Point::new(0.0, 20.0));
+}
+
+#[test]
+fn an_empty_drawing_is_refused() {
+    let machine = machines::corexy();
+    assert_eq!(plan(&machine, &Drawing::default(), &settings()).unwrap_err(), PlanError::NoInk);
+}
+
+#[test]
+fn life_size_puts_the_origin_at_the_sheets_corner() {
+    let machine = machines::arm();
+    let map = place(&machine, &line(&[(0.0, 0.0), (10.0, 10.0)]), &Wish::default()).unwrap();
+    assert_eq!(map.as_coeffs(), [1.0, 0.0, 0.0, 1.0, 12.7, 76.2]);
+}
+
+#[test]
+fn a_quarter_turn_keeps_the_lower_left_corner_of_the_ink() {
+    let machine = machines::corexy();
+    let drawing = line(&[(10.0, 20.0), (40.0, 60.0)]);
+    let wish = Wish { rotate: std::f64::consts::FRAC_PI_2, ..Wish::default() };
+    let mut placed = drawing.clone();
+    placed.transform(place(&machine, &drawing, &wish).unwrap());
+    assert_eq!(placed.bounding_box().unwrap(), Rect::new(10.0, 20.0, 50.0, 50.0));
+}
+
+#[test]
+fn fitting_fills_a_sheet() {
+    let machine = machines::corexy();
+    let placed = fitted(&machine, &line(&[(3.0, 5.0), (23.0, 5.0), (23.0, 15.0)]));
+    let ink = placed.bounding_box().unwrap();
+    assert!(
+        (ink.width() - 200.0).abs() < 1e-6 && (ink.center() - Point::new(100.0, 100.0)).hypot2() < 1e-9,
+        "{ink}"
+    );
+}
+
+/// The half ring's best place for a full square: side a with its lower edge tangent to the inner circle or its lower
+/// corners on the base line beside it. Above the hole: (a/2)² + (48 + a)² = 138² gives a = 83.53 mm. Beside the hole: from
+/// x to x + a with x = 48 at y = 0: (48 + a)² + a² = 138² gives a = 70.58 mm. So the best is 83.53 mm.
+#[test]
+fn fitting_finds_the_largest_square_in_a_half_ring() {
+    let machine = machines::polar();
+    let square = line(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]);
+    let side = fitted(&machine, &square).bounding_box().unwrap().width();
+    assert!(side > 83.53 * 0.9995 && side <= 83.53, "{side}");
+}
+
+/// An arch can lie around the hole, where a filled rectangle of its size could not.
+#[test]
+fn fitting_lays_an_arch_around_the_hole() {
+    let machine = machines::polar();
+    let mut arch = Stroke::new(Pen(1), Point::new(10.0, 0.0), Span::default());
+    arch.arc(EllipticArc::circular(Point::ZERO, 10.0, 0.0, std::f64::consts::PI));
+    let drawing = Drawing { strokes: vec![arch] };
+    let width = fitted(&machine, &drawing).bounding_box().unwrap().width();
+    assert!(width > 275.0 && width <= 276.0 + 1e-6, "{width}");
+}
