@@ -307,7 +307,10 @@ impl Machine {
     /// may exceed its range there by what a curve leaves its chord by, seen from no nearer than 10 mm.
     pub fn joint_fault_between(&self, q: &Joints) -> Option<Fault> {
         let angles = self.parts.geometry.joint_is_angle();
-        self.joint_fault_beyond(q, angles.map(|angle| if angle { CHORD_TOLERANCE / 10.0 } else { CHORD_TOLERANCE }))
+        self.joint_fault_beyond(
+            q,
+            angles.map(|angle| if angle { CHORD_TOLERANCE / 10.0 } else { CHORD_TOLERANCE }),
+        )
     }
 
     fn joint_fault_beyond(&self, q: &Joints, slack: [f64; 2]) -> Option<Fault> {

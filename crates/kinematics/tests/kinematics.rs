@@ -24,7 +24,7 @@ fn machine(geometry: Geometry, coupling: [[f64; 2]; 2], counts: [f64; 2], start:
         start,
         period: 0.01,
     })
-    .unwrap()
+    .expect("the parts make a machine")
 }
 
 fn geometry() -> impl Strategy<Value = Geometry> {

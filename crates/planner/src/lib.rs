@@ -18,7 +18,9 @@ pub mod path;
 pub mod placement;
 pub mod time_law;
 pub mod trajectory;
+mod travel;
 
 pub use error::PlanError;
 pub use lift::JointPath;
-pub use trajectory::{ExactRow, Settings, Trajectory, plan};
+pub use trajectory::{ExactRow, Settings, Times, Trajectory, check_reach, plan};
+pub use travel::travel_time;

@@ -1,6 +1,6 @@
 //! Lifting the pen's path into joint space, adaptively, with bounds that hold between the nodes too.
 
-use drawing::{Line, Point, Segment, Vec2};
+use drawing::{Point, Segment, Vec2};
 use kinematics::{Fault, Joints, Machine, OutOfReach};
 use nalgebra::Vector2;
 
@@ -69,6 +69,9 @@ struct Sample {
     speed: f64,
     first: Vector2<f64>,
     second: Vector2<f64>,
+    /// Of the drawn curve, 1/mm.
+    curvature: f64,
+    /// See [`Cell::bend`].
     bend: f64,
 }
 
@@ -192,9 +195,7 @@ impl Lifter<'_> {
             let middle = self.sample(piece, 0.5 * (a.t + b.t), a.pose)?;
             let length = arc_length(piece, &a, &middle, &b);
             let mismatch = rate_mismatch(piece, length, &a, &middle, &b);
-            if length > SHORTEST
-                && (mismatch > LARGEST_MISMATCH || !self.is_fine(piece, length, &a, &middle, &b))
-            {
+            if length > SHORTEST && (mismatch > LARGEST_MISMATCH || !self.is_fine(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
                 continue;
@@ -235,18 +236,13 @@ impl Lifter<'_> {
         of(0).max(of(1))
     }
 
-    fn is_fine(&self, piece: &Segment, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
+    fn is_fine(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
         if self.turned(a, b) > LARGEST_TURN {
             return false;
         }
         let geometry = self.machine.geometry();
-        let chord = Line::new(a.point, b.point);
-        let sagitta = if matches!(piece, Segment::Line(_)) {
-            0.0
-        } else {
-            length * length * middle.curvature_bound(a, b) / 8.0
-        };
-        if geometry.bend(&a.pose, &b.pose) / 8.0 + sagitta > self.tolerance && chord.p0 != chord.p1 {
+        let curvature = a.curvature.max(middle.curvature).max(b.curvature);
+        if (geometry.bend(&a.pose, &b.pose) + length * length * curvature) / 8.0 > self.tolerance {
             return false;
         }
         // Variation matters as a share of what limits the pen: speeds over the motors' limits, accelerations at the
@@ -290,15 +286,9 @@ impl Lifter<'_> {
         let curvature = if matches!(piece, Segment::Line(_)) { Vec2::ZERO } else { curvature };
         let (rates, _) = self.machine.geometry().path_derivatives(&pose, tangent, curvature);
         let (first, second) = self.machine.motor_derivatives(&pose, tangent, curvature);
-        let bend = curvature.hypot2().sqrt() + self.machine.geometry().bend(&pose, &(pose + rates));
-        Ok(Sample { t, point, pose, speed, first, second, bend })
-    }
-}
-
-impl Sample {
-    /// Curvature over a cell, as far as three samples tell: `bend` holds it and more.
-    fn curvature_bound(&self, a: &Self, b: &Self) -> f64 {
-        self.bend.max(a.bend).max(b.bend)
+        let turn = curvature.hypot2().sqrt();
+        let bend = turn + self.machine.geometry().bend(&pose, &(pose + rates));
+        Ok(Sample { t, point, pose, speed, first, second, curvature: turn, bend })
     }
 }
 
@@ -317,13 +307,11 @@ fn arc_length(piece: &Segment, a: &Sample, middle: &Sample, b: &Sample) -> f64 {
 ///
 /// The middle of the Hermite interpolant has the slope 3/2 (t1 - t0) / length - (rate0 + rate1) / 4.
 fn rate_mismatch(piece: &Segment, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> f64 {
-    match piece {
-        Segment::Line(_) => 0.0,
-        _ => {
-            let slope = 1.5 * (b.t - a.t) / length - 0.25 * (1.0 / a.speed + 1.0 / b.speed);
-            (slope * middle.speed - 1.0).abs()
-        }
+    if matches!(piece, Segment::Line(_)) {
+        return 0.0;
     }
+    let slope = 1.5 * (b.t - a.t) / length - 0.25 * (1.0 / a.speed + 1.0 / b.speed);
+    (slope * middle.speed - 1.0).abs()
 }
 
 /// The largest size of each component.

@@ -88,6 +88,25 @@ pub fn plan<'a>(
     planner.run(drawing)
 }
 
+/// Looks for strokes that the machine cannot draw, in the drawing's order; gives the first.
+///
+/// # Errors
+/// With the first stroke that leaves what the machine can draw.
+pub fn check_reach(machine: &Machine, drawing: &Drawing) -> Result<(), PlanError> {
+    for (index, stroke) in drawing.strokes.iter().enumerate() {
+        let inside = machine
+            .check_point(stroke.start())
+            .and_then(|()| stroke.segments().try_for_each(|segment| machine.check_segment(&segment)));
+        inside.map_err(|source| PlanError::OutOfReach {
+            stroke: index,
+            pen: stroke.pen,
+            span: stroke.source,
+            source,
+        })?;
+    }
+    Ok(())
+}
+
 fn check(settings: &Settings) -> Result<(), PlanError> {
     let setting =
         |holds: bool, what: &str| holds.then_some(()).ok_or(PlanError::Setting { what: what.into() });
@@ -199,6 +218,15 @@ impl Trajectory<'_> {
     /// How long the plan takes, microseconds.
     pub fn duration_us(&self) -> u64 {
         self.legs.iter().map(|leg| leg.periods() * self.period_us).sum()
+    }
+
+    /// How many rows [`Self::rows`] gives.
+    pub fn row_count(&self) -> u64 {
+        let of = |leg: &Leg| match leg {
+            Leg::Move { periods, .. } => *periods,
+            Leg::Pen { periods, .. } => u64::from(*periods > 0),
+        };
+        self.legs.iter().map(of).sum::<u64>() + 1
     }
 
     /// The rows, one period apart; while the motors stand still for the pen only the first row is given.

@@ -27,7 +27,7 @@ fn stroke() -> impl Strategy<Value = Stroke> {
                 );
                 points.push(at);
             }
-            Stroke::polyline(Pen(1), points, Span::default()).unwrap()
+            Stroke::polyline(Pen(1), points, Span::default()).expect("points")
         },
     );
     prop_oneof![
@@ -61,13 +61,13 @@ fn drawing() -> impl Strategy<Value = Drawing> {
 fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {
     let wish = Wish { rotate: 0.0, size: Size::Fit };
     let mut placed = drawing.clone();
-    placed.transform(place(machine, drawing, &wish).unwrap());
+    placed.transform(place(machine, drawing, &wish).expect("it fits"));
     placed
 }
 
 /// Rows with the pauses filled in, so that all are one period apart.
 fn filled(rows: &[ExactRow], period_us: u64) -> Vec<[f64; 2]> {
-    let mut all = vec![rows[0].exact; 2];
+    let mut all = vec![rows[0].exact; 2]; // at rest before the first row
     for pair in rows.windows(2) {
         let periods = (pair[1].row.t_us - pair[0].row.t_us) / period_us;
         assert_eq!((pair[1].row.t_us - pair[0].row.t_us) % period_us, 0);
@@ -79,7 +79,7 @@ fn filled(rows: &[ExactRow], period_us: u64) -> Vec<[f64; 2]> {
         }
         all.push(pair[1].exact);
     }
-    all.extend([*all.last().unwrap(); 2]);
+    all.extend([rows[rows.len() - 1].exact; 2]);
     all
 }
 
@@ -119,6 +119,7 @@ proptest! {
         prop_assert_eq!(last.ticks, first.ticks);
         prop_assert_eq!((first.t_us, first.pen, last.pen), (0, 0, 0));
         prop_assert_eq!(last.t_us, trajectory.duration_us());
+        prop_assert_eq!(rows.len() as u64, trajectory.row_count());
         prop_assert!(rows.windows(2).all(|w| w[1].row.t_us > w[0].row.t_us));
 
         let all = filled(&rows, period_us);
@@ -171,7 +172,7 @@ fn settings() -> Settings {
 
 fn line(points: &[(f64, f64)]) -> Drawing {
     let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
-    Drawing { strokes: vec![Stroke::polyline(Pen(1), points, Span { start: 7, end: 19 }).unwrap()] }
+    Drawing { strokes: vec![Stroke::polyline(Pen(1), points, Span { start: 7, end: 19 }).expect("points")] }
 }
 
 #[test]

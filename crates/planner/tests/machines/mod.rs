@@ -28,7 +28,7 @@ fn build(
         start,
         period: 0.01,
     })
-    .unwrap()
+    .expect("the parts make a machine")
 }
 
 pub fn arm() -> Machine {

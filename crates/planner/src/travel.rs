@@ -1,0 +1,35 @@
+//! What travel costs, in the motors' own time.
+
+use drawing::Point;
+use kinematics::{Joints, Machine};
+
+/// How long it takes to lift the pen at `from`, travel to `to` in joint space and lower it there, s: what ordering
+/// minimises. Symmetric. Infinite where a point is out of reach.
+///
+/// All motors start and stop together on a trapezoid: with `v` and `a` the smallest of each motor's limit over its way,
+/// the time is `2 / sqrt(a)` when the top speed is not reached (`v² >= a`), else `1 / v + v / a`.
+pub fn travel_time(machine: &Machine, from: Point, to: Point) -> f64 {
+    let pose = |p: Point| machine.pose_near(p, &machine.start());
+    let (Ok(a), Ok(b)) = (pose(from), pose(to)) else { return f64::INFINITY };
+    machine.pen().lift_time + joint_time(machine, &a, &b) + machine.pen().drop_time
+}
+
+/// The trapezoid's time from pose to pose, s.
+fn joint_time(machine: &Machine, from: &Joints, to: &Joints) -> f64 {
+    let change = machine.motor_rates(&(to - from));
+    let (mut speed, mut acceleration) = (f64::INFINITY, f64::INFINITY);
+    for (k, motor) in machine.motors().iter().enumerate() {
+        let way = change[k].abs();
+        if way > 0.0 {
+            speed = speed.min(motor.max_speed / way);
+            acceleration = acceleration.min(motor.max_acceleration / way);
+        }
+    }
+    if speed == f64::INFINITY {
+        0.0
+    } else if speed * speed >= acceleration {
+        2.0 / acceleration.sqrt()
+    } else {
+        1.0 / speed + speed / acceleration
+    }
+}
