@@ -1,0 +1,139 @@
+//! One motor's column against its limits, in finite differences of whole ticks.
+
+use crate::{MotorPeak, histogram::Histogram};
+
+/// A finite difference beyond its bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Excess {
+    /// The speed or acceleration.
+    pub value: f64,
+    /// The limit with the allowance for rounding.
+    pub allowed: f64,
+}
+
+impl Excess {
+    pub(crate) fn share(self) -> f64 {
+        self.value / self.allowed
+    }
+}
+
+/// Follows one motor from row to row.
+///
+/// Let the motor really follow `q(t)` with `|q'| <= v` and `|q''| <= a`, and let the table hold `q` at the rows' times
+/// to half a tick. Over a step `h` the mean speed `V = (q1 - q0) / h` obeys `|V| <= v`, and the two ticks change it by
+/// `(1/2 + 1/2) / h` at the most:
+///
+/// ```text
+/// |V| <= v + 1/h                                    (1)   times h = T:  |first difference| <= v T + 1
+/// ```
+///
+/// Over two neighbouring steps `h1`, `h2` the divided difference gives `V2 - V1 = q''(somewhere) (h1 + h2) / 2`; the
+/// middle tick enters twice:
+///
+/// ```text
+/// |V2 - V1| <= a (h1 + h2) / 2 + 1/h1 + 1/h2        (2)   times h = T:  |second difference| <= a T^2 + 2
+/// ```
+///
+/// A step longer than the period stands for the rows that were left out of it, on which the motor moves evenly
+/// (or not at all): at its ends it counts in (2) as one period at that speed. Before the first row and after the
+/// last the motor is at rest.
+#[derive(Clone, Debug)]
+pub(crate) struct MotorCheck {
+    motor: plan::Motor,
+    period_s: f64,
+    velocity: f64,
+    step_s: f64,
+    speed: f64,
+    acceleration: f64,
+    speed_share: f64,
+    acceleration_share: f64,
+    speed_shares: Histogram,
+    acceleration_shares: Histogram,
+}
+
+/// Comparisons forgive what computing the bound itself may cost.
+const ROUNDING: f64 = 1.0 + 1e-9;
+
+impl MotorCheck {
+    pub(crate) fn new(motor: plan::Motor, period_us: u64) -> Self {
+        let period_s = period_us.max(1) as f64 * 1e-6;
+        Self {
+            motor,
+            period_s,
+            velocity: 0.0,
+            step_s: period_s,
+            speed: 0.0,
+            acceleration: 0.0,
+            speed_share: 0.0,
+            acceleration_share: 0.0,
+            speed_shares: Histogram::new(),
+            acceleration_shares: Histogram::new(),
+        }
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.motor.name
+    }
+
+    /// The motor goes by `difference` ticks in `dt_us`: too fast by (1), and too sudden at the step's beginning by (2).
+    pub(crate) fn step(&mut self, dt_us: u64, difference: i64) -> (Option<Excess>, Option<Excess>) {
+        let dt_s = dt_us as f64 * 1e-6;
+        let velocity = difference as f64 / dt_s;
+        let mut fast = None;
+        if difference != 0 {
+            let allowed = self.motor.limits.speed + 1.0 / dt_s;
+            let value = velocity.abs();
+            let share = value / allowed;
+            self.speed = self.speed.max(value);
+            self.speed_share = self.speed_share.max(share);
+            self.speed_shares.add(share, 1.0);
+            fast = exceeds(value, allowed);
+        }
+        (fast, self.turn(velocity, dt_s.min(self.period_s)))
+    }
+
+    /// The motor stands still from now on.
+    pub(crate) fn stop(&mut self) -> Option<Excess> {
+        self.turn(0.0, self.period_s)
+    }
+
+    fn turn(&mut self, velocity: f64, step_s: f64) -> Option<Excess> {
+        let (before, step_before) = (self.velocity, self.step_s);
+        (self.velocity, self.step_s) = (velocity, step_s);
+        if before == 0.0 && velocity == 0.0 {
+            return None;
+        }
+        let mean_s = 0.5 * (step_before + step_s);
+        let value = (velocity - before).abs() / mean_s;
+        let allowed = self.motor.limits.acceleration + (1.0 / step_before + 1.0 / step_s) / mean_s;
+        let share = value / allowed;
+        self.acceleration = self.acceleration.max(value);
+        self.acceleration_share = self.acceleration_share.max(share);
+        self.acceleration_shares.add(share, 1.0);
+        exceeds(value, allowed)
+    }
+
+    pub(crate) fn limits(&self) -> plan::Limits {
+        self.motor.limits
+    }
+
+    pub(crate) fn peak(self) -> MotorPeak {
+        MotorPeak {
+            speed_share_p999: self.speed_shares.percentile(0.999, self.speed_share),
+            acceleration_share_p999: self.acceleration_shares.percentile(0.999, self.acceleration_share),
+            name: self.motor.name,
+            speed: self.speed,
+            acceleration: self.acceleration,
+            speed_limit: self.motor.limits.speed,
+            acceleration_limit: self.motor.limits.acceleration,
+            speed_share: self.speed_share,
+            acceleration_share: self.acceleration_share,
+        }
+    }
+}
+
+/// A limit that is not a number is exceeded by everything.
+fn exceeds(value: f64, allowed: f64) -> Option<Excess> {
+    let within = value <= allowed * ROUNDING;
+    (!within).then_some(Excess { value, allowed })
+}

@@ -1,0 +1,242 @@
+//! The drawing as the verifier sees it: straight pieces by pen, each divided into cells, in a tree of boxes.
+
+use drawing::{Drawing, Point, Rect, Segment, Span, Vec2};
+
+/// Curves are replaced by chords within this share of the tolerance; the difference is added to what is measured.
+const FLATNESS: f64 = 1.0 / 500.0;
+
+/// Cells are this share of the tolerance long.
+const CELL: f64 = 1.0 / 4.0;
+
+/// No more cells than this (and one a piece): from there on they grow, and only their middles are looked at.
+const MAX_CELLS: f64 = (1_u32 << 24) as f64;
+
+/// How many children a box of the tree has.
+const FAN: usize = 8;
+
+/// A straight piece of a stroke, in a frame of its own: a point of the plane is (along, across) from `start`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    start: Point,
+    /// Unit vector; any for a dot.
+    along: Vec2,
+    /// 0 for a dot.
+    pub(crate) length: f64,
+    /// How far the stroke itself may be from this piece, mm: 0 for what was drawn straight.
+    pub(crate) error: f64,
+    /// Index of its first cell.
+    pub(crate) first_cell: u32,
+    /// How many equal cells it is divided into; at least 1.
+    pub(crate) cells: u32,
+    /// Index of its stroke in the drawing.
+    pub(crate) stroke: u32,
+}
+
+impl Piece {
+    fn new(start: Point, end: Point, error: f64, stroke: usize) -> Self {
+        let vector = end - start;
+        let length = libm::hypot(vector.x, vector.y);
+        let along = if length > 0.0 { vector / length } else { Vec2::new(1.0, 0.0) };
+        Self { start, along, length, error, first_cell: 0, cells: 1, stroke: stroke as u32 }
+    }
+
+    /// `p` in the piece's frame: how far along it, and how far to its left.
+    pub(crate) fn local(&self, p: Point) -> (f64, f64) {
+        let v = p - self.start;
+        (v.dot(self.along), self.along.cross(v))
+    }
+
+    /// The point so far along.
+    pub(crate) fn at(&self, along: f64) -> Point {
+        self.start + along * self.along
+    }
+
+    /// Distance from a point in the piece's frame to the stroke: an upper bound, off by 2 `error` at most.
+    pub(crate) fn distance(&self, (along, across): (f64, f64)) -> f64 {
+        let beyond = along - along.clamp(0.0, self.length);
+        (beyond * beyond + across * across).sqrt() + self.error
+    }
+
+    pub(crate) fn bounds(&self) -> Rect {
+        Rect::from_points(self.start, self.at(self.length))
+    }
+}
+
+/// Whether two boxes have a point in common.
+pub(crate) fn meet(a: Rect, b: Rect) -> bool {
+    a.x0 <= b.x1 && b.x0 <= a.x1 && a.y0 <= b.y1 && b.y0 <= a.y1
+}
+
+fn distance_to_box(p: Point, bounds: Rect) -> f64 {
+    let x = p.x - p.x.clamp(bounds.x0, bounds.x1);
+    let y = p.y - p.y.clamp(bounds.y0, bounds.y1);
+    (x * x + y * y).sqrt()
+}
+
+/// All ink of one pen.
+#[derive(Clone, Debug)]
+pub(crate) struct PenTarget {
+    pub(crate) pen: u16,
+    pub(crate) pieces: Vec<Piece>,
+    /// `levels[0][i]` bounds the pieces from `FAN * i` on, `levels[k + 1][i]` the boxes of `levels[k]` likewise; the
+    /// last level is one box.
+    levels: Vec<Vec<Rect>>,
+}
+
+impl PenTarget {
+    fn new(pen: u16, mut pieces: Vec<Piece>) -> Self {
+        sort_by_place(&mut pieces);
+        let mut levels: Vec<Vec<Rect>> = Vec::new();
+        let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
+        let leaves: Vec<Rect> = pieces
+            .chunks(FAN)
+            .map(|chunk| union(&chunk.iter().map(Piece::bounds).collect::<Vec<_>>()))
+            .collect();
+        let mut level = leaves;
+        while level.len() > 1 {
+            let next = level.chunks(FAN).map(union).collect();
+            levels.push(std::mem::replace(&mut level, next));
+        }
+        levels.push(level);
+        Self { pen, pieces, levels }
+    }
+
+    /// Calls `to` with the index of every piece whose box meets `bounds`.
+    pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32)) {
+        let mut open = vec![(self.levels.len() - 1, 0)];
+        while let Some((level, index)) = open.pop() {
+            if !meet(self.levels[level][index], bounds) {
+                continue;
+            }
+            let children = FAN * index..FAN * (index + 1);
+            if level > 0 {
+                open.extend(
+                    children.take_while(|i| *i < self.levels[level - 1].len()).map(|i| (level - 1, i)),
+                );
+            } else {
+                for i in children.take_while(|i| *i < self.pieces.len()) {
+                    if meet(self.pieces[i].bounds(), bounds) {
+                        to(i as u32);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The nearest piece to `p` and its distance, by branch and bound.
+    pub(crate) fn nearest(&self, p: Point) -> (f64, u32) {
+        let mut best = (f64::INFINITY, 0);
+        let mut open = vec![(0.0, self.levels.len() - 1, 0)];
+        while let Some((at_least, level, index)) = open.pop() {
+            if at_least > best.0 {
+                continue;
+            }
+            let children = FAN * index..FAN * (index + 1);
+            if level > 0 {
+                let first = open.len();
+                for i in children.take_while(|i| *i < self.levels[level - 1].len()) {
+                    open.push((distance_to_box(p, self.levels[level - 1][i]), level - 1, i));
+                }
+                // The nearest box is opened first.
+                open[first..].sort_by(|a, b| b.0.total_cmp(&a.0));
+            } else {
+                for i in children.take_while(|i| *i < self.pieces.len()) {
+                    let distance = self.pieces[i].distance(self.pieces[i].local(p));
+                    if distance < best.0 {
+                        best = (distance, i as u32);
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Sorts pieces along a Morton (Z-order) curve through their middles, so that neighbours share boxes.
+fn sort_by_place(pieces: &mut [Piece]) {
+    let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return };
+    let scale = 65535.0 / all.width().max(all.height()).max(f64::MIN_POSITIVE);
+    let spread = |value: f64| {
+        let mut bits = u64::from(value as u16);
+        bits = (bits | bits << 8) & 0x00ff_00ff;
+        bits = (bits | bits << 4) & 0x0f0f_0f0f;
+        bits = (bits | bits << 2) & 0x3333_3333;
+        (bits | bits << 1) & 0x5555_5555
+    };
+    pieces.sort_by_cached_key(|piece| {
+        let middle = piece.at(0.5 * piece.length);
+        spread((middle.x - all.x0) * scale) | spread((middle.y - all.y0) * scale) << 1
+    });
+}
+
+/// The whole drawing.
+#[derive(Clone, Debug)]
+pub(crate) struct Target {
+    /// Sorted by pen; none is empty.
+    pub(crate) pens: Vec<PenTarget>,
+    /// Where the source says each stroke.
+    pub(crate) sources: Vec<Span>,
+    /// How many cells there are in all.
+    pub(crate) cells: usize,
+    /// Longest cell, if only their middles are looked at; otherwise 0.
+    pub(crate) sparse_mm: f64,
+    /// Strokes with coordinates that are not finite.
+    pub(crate) broken: Vec<usize>,
+}
+
+impl Target {
+    pub(crate) fn new(drawing: &Drawing, tolerance_mm: f64) -> Self {
+        let flatness = tolerance_mm * FLATNESS;
+        let mut by_pen: Vec<(u16, Vec<Piece>)> =
+            drawing.pens().into_iter().filter(|pen| pen.0 != 0).map(|pen| (pen.0, Vec::new())).collect();
+        let mut broken = Vec::new();
+        for (index, stroke) in drawing.strokes.iter().enumerate() {
+            let Ok(slot) = by_pen.binary_search_by_key(&stroke.pen.0, |(pen, _)| *pen) else { continue };
+            let pieces = &mut by_pen[slot].1;
+            let first = pieces.len();
+            for segment in stroke.segments() {
+                let error = if matches!(segment, Segment::Line(_)) { 0.0 } else { flatness };
+                let mut from = segment.start();
+                segment.flatten(flatness, |to| {
+                    if to != from {
+                        pieces.push(Piece::new(from, to, error, index));
+                    }
+                    from = to;
+                });
+            }
+            if pieces.len() == first {
+                pieces.push(Piece::new(stroke.start(), stroke.start(), 0.0, index));
+            }
+            if pieces[first..].iter().any(|piece| !piece.length.is_finite() || !piece.start.is_finite()) {
+                pieces.truncate(first);
+                broken.push(index);
+            }
+        }
+        let length: f64 = by_pen.iter().flat_map(|(_, pieces)| pieces).map(|piece| piece.length).sum();
+        let fine = tolerance_mm * CELL;
+        let (cell, sparse) =
+            if length / fine > MAX_CELLS { (length / MAX_CELLS, true) } else { (fine, false) };
+        let mut pens: Vec<PenTarget> = by_pen
+            .into_iter()
+            .filter(|(_, pieces)| !pieces.is_empty())
+            .map(|(pen, pieces)| PenTarget::new(pen, pieces))
+            .collect();
+        let mut cells = 0;
+        for piece in pens.iter_mut().flat_map(|pen| &mut pen.pieces) {
+            piece.first_cell = cells;
+            piece.cells = (piece.length / cell).ceil().max(1.0) as u32;
+            cells += piece.cells;
+        }
+        Self {
+            pens,
+            sources: drawing.strokes.iter().map(|stroke| stroke.source).collect(),
+            cells: cells as usize,
+            sparse_mm: if sparse { cell } else { 0.0 },
+            broken,
+        }
+    }
+
+    pub(crate) fn pen(&self, pen: u16) -> Option<usize> {
+        self.pens.binary_search_by_key(&pen, |target| target.pen).ok()
+    }
+}

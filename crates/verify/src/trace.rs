@@ -1,0 +1,513 @@
+//! One path of the pen against the drawing, both ways, as it streams by.
+//!
+//! The path arrives as short chords. Chords that lie on one line are merged; what is left is called a **run**, a
+//! straight line that stands for a part of the path and is at most `error` away from it, both ways.
+//!
+//! **Ink to drawing.** The distance from a point to one straight piece is convex along a run, so over the whole run it
+//! is at most what it is at the run's ends. Where different pieces are nearest to the two ends (at the drawing's
+//! corners) the run is halved until the bound is tight. No sampling is involved.
+//!
+//! **Drawing to ink.** Each straight piece of the drawing is divided into short cells. The distance to one run is
+//! convex along a cell, so the cell is covered to within the larger value at its ends; the least over all runs is kept.
+//! A cell that lies beside the joint `v` of two consecutive runs is divided at `m`, the point nearest to `v`: one run
+//! answers for each half.
+
+use drawing::{Point, Rect, Vec2};
+
+use crate::{
+    Place, Spread,
+    histogram::Histogram,
+    target::{Piece, Target},
+};
+
+/// Chords are merged into a run that stays within this share of the tolerance of each of them.
+const MERGE: f64 = 1.0 / 1000.0;
+/// No run is merged beyond so many tolerances.
+const LONGEST_RUN: f64 = 10.0;
+/// A bound on the ink's distance is tight enough if it is above the value at the ends by this share of the tolerance.
+const TIGHT: f64 = 1.0 / 200.0;
+/// A run is not halved more often than this.
+const HALVINGS: u32 = 24;
+
+/// Where in the table something happens.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct At {
+    pub(crate) row: u64,
+    pub(crate) t_us: u64,
+}
+
+/// A straight line that stands for a part of the path.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    from: Point,
+    to: Point,
+    error: f64,
+    at: At,
+}
+
+/// Chords being merged: all that start at `anchor` and go in a direction between `right` and `left` pass every
+/// point so far within the merging distance.
+#[derive(Clone, Copy, Debug)]
+struct Chain {
+    anchor: Point,
+    last: Point,
+    chords: u32,
+    /// Unit vectors; nothing so far.
+    cone: Option<(Vec2, Vec2)>,
+    error: f64,
+    at: At,
+    /// The run before, if the pen came from there.
+    before: Option<Run>,
+    moved: bool,
+}
+
+/// The largest distance of the ink from the drawing so far, and where.
+#[derive(Clone, Copy, Debug)]
+struct Worst {
+    mm: f64,
+    at: At,
+    point: Point,
+    stroke: u32,
+    pen: u16,
+}
+
+/// A part of the drawing that no ink comes near enough to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Miss {
+    pub(crate) pen: u16,
+    pub(crate) mm: f64,
+    /// Whether `mm` is only known to be exceeded.
+    pub(crate) more: bool,
+    /// Length of what is missed.
+    pub(crate) length: f64,
+    /// How many strokes miss a part.
+    pub(crate) strokes: u64,
+    pub(crate) place: Place,
+}
+
+/// One path of the pen.
+#[derive(Clone, Debug)]
+pub(crate) struct Trace {
+    tolerance: f64,
+    merge: f64,
+    /// Cells further than this from a run are not touched by it.
+    radius: f64,
+    smallest_radius: f64,
+    /// Bound on each cell's distance from the ink, mm; infinite where no ink came near.
+    covered: Vec<f32>,
+    pen: usize,
+    chain: Option<Chain>,
+    /// Pieces of this pen that meet `near_bounds`.
+    near: Vec<u32>,
+    near_bounds: Option<Rect>,
+    distances: Histogram,
+    worst: Option<Worst>,
+    pub(crate) length: f64,
+    pub(crate) dots: u64,
+}
+
+impl Trace {
+    pub(crate) fn new(target: &Target, tolerance: f64, floor: f64) -> Self {
+        let mut trace = Self {
+            tolerance,
+            merge: tolerance * MERGE,
+            radius: 0.0,
+            smallest_radius: 0.0,
+            covered: vec![f32::INFINITY; target.cells],
+            pen: 0,
+            chain: None,
+            near: Vec::new(),
+            near_bounds: None,
+            distances: Histogram::new(),
+            worst: None,
+            length: 0.0,
+            dots: 0,
+        };
+        trace.widen(floor);
+        trace.smallest_radius = trace.radius;
+        trace
+    }
+
+    /// Ink may be off by the tolerance and `floor`: look four times as far as the one and twice as far as the other.
+    pub(crate) fn widen(&mut self, floor: f64) {
+        let radius = 4.0 * self.tolerance + 2.0 * floor;
+        if radius > self.radius {
+            self.radius = radius;
+            self.near_bounds = None;
+        }
+    }
+
+    /// The tolerance that resolutions follow, mm.
+    pub(crate) fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// The pen, whose strokes are `target.pens[pen]`, is put down at `point`.
+    pub(crate) fn down(&mut self, pen: usize, point: Point, at: At) {
+        if self.pen != pen {
+            self.pen = pen;
+            self.near_bounds = None;
+        }
+        self.chain = Some(Chain::new(point, at, None, false));
+    }
+
+    /// The pen goes on to `point`, on a path at most `error` away from the chord.
+    pub(crate) fn to(&mut self, target: &Target, point: Point, error: f64, at: At) {
+        let Some(chain) = &mut self.chain else { return };
+        if point == chain.last && error == 0.0 {
+            return;
+        }
+        if chain.extend(point, error, self.merge, LONGEST_RUN * self.tolerance) {
+            return;
+        }
+        let (run, before, from) = (chain.run(self.merge), chain.before, chain.last);
+        let mut next = Chain::new(from, at, Some(run), true);
+        next.extend(point, error, self.merge, f64::INFINITY);
+        self.chain = Some(next);
+        self.measure(target, run, before);
+    }
+
+    /// The pen is lifted.
+    pub(crate) fn up(&mut self, target: &Target) {
+        let Some(chain) = self.chain.take() else { return };
+        if !chain.moved {
+            self.dots += 1;
+        }
+        if chain.chords > 0 || !chain.moved {
+            self.measure(target, chain.run(self.merge), chain.before);
+        }
+    }
+
+    /// Measures one run both ways; `before` is the run that ends where it begins.
+    fn measure(&mut self, target: &Target, run: Run, before: Option<Run>) {
+        let strokes = &target.pens[self.pen];
+        let bounds = Rect::from_points(run.from, run.to).inflate(self.radius, self.radius);
+        self.gather(target, bounds);
+
+        let mut nearest = [(f64::INFINITY, 0_u32); 2];
+        // Least over the pieces of the larger distance at the run's ends.
+        let mut bound = f64::INFINITY;
+        for &index in &self.near {
+            let piece = &strokes.pieces[index as usize];
+            let local = LocalRun::new(piece, &run);
+            let [from, to] = local.ends;
+            let distances = [piece.distance(from), piece.distance(to)];
+            for (best, distance) in nearest.iter_mut().zip(distances) {
+                if distance < best.0 {
+                    *best = (distance, index);
+                }
+            }
+            bound = bound.min(distances[0].max(distances[1]));
+            if target.sparse_mm > 0.0 {
+                local.cover_middles(piece, self.radius, &mut self.covered);
+            } else {
+                local.cover(piece, self.radius, &mut self.covered);
+                if let Some(before) = &before {
+                    LocalRun::new(piece, before).cover_joint(&local, piece, self.radius, &mut self.covered);
+                }
+            }
+        }
+        // Beyond the radius the list may not hold the nearest piece.
+        for (best, point) in nearest.iter_mut().zip([run.from, run.to]) {
+            if best.0 > self.radius {
+                *best = strokes.nearest(point);
+            }
+        }
+
+        let length = distance(run.from, run.to);
+        self.length += length;
+        let ends = [(run.from, nearest[0].0), (run.to, nearest[1].0)];
+        let near = Near { pieces: &strokes.pieces, indices: &self.near, tight: TIGHT * self.tolerance };
+        let distances = &mut self.distances;
+        let mut largest = 0.0_f64;
+        near.bound(ends, bound, HALVINGS, &mut |value, length| {
+            distances.add(value + run.error, length);
+            largest = largest.max(value + run.error);
+        });
+        if self.worst.is_none_or(|worst| largest > worst.mm) {
+            let end = usize::from(nearest[1].0 > nearest[0].0);
+            self.worst = Some(Worst {
+                mm: largest,
+                at: run.at,
+                point: ends[end].0,
+                stroke: strokes.pieces[nearest[end].1 as usize].stroke,
+                pen: strokes.pen,
+            });
+        }
+    }
+
+    /// Makes sure that `near` holds every piece that meets `bounds`: a wider list is kept while the pen stays near.
+    fn gather(&mut self, target: &Target, bounds: Rect) {
+        let holds = |known: Rect| {
+            known.x0 <= bounds.x0 && bounds.x1 <= known.x1 && known.y0 <= bounds.y0 && bounds.y1 <= known.y1
+        };
+        if self.near_bounds.is_some_and(holds) {
+            return;
+        }
+        let wider = bounds.inflate(2.0 * self.radius, 2.0 * self.radius);
+        self.near.clear();
+        target.pens[self.pen].visit(wider, |index| self.near.push(index));
+        self.near_bounds = Some(wider);
+    }
+
+    /// How far the ink strays.
+    pub(crate) fn ink_to_drawing(&self) -> Spread {
+        let max_mm = self.worst.map_or(0.0, |worst| worst.mm);
+        Spread { max_mm, p99_mm: self.distances.percentile(0.99, max_mm), more: false, unseen_mm: 0.0 }
+    }
+
+    /// Pen, distance and place of the ink that strays furthest.
+    pub(crate) fn stray(&self, target: &Target) -> Option<(u16, f64, Place)> {
+        self.worst.map(|worst| {
+            let stroke = worst.stroke as usize;
+            let place = Place {
+                row: Some(worst.at.row),
+                t_us: Some(worst.at.t_us),
+                point_mm: Some(worst.point),
+                stroke: Some(stroke),
+                source: target.sources.get(stroke).copied(),
+            };
+            (worst.pen, worst.mm, place)
+        })
+    }
+
+    /// How much of the drawing is missed, and, pen by pen, what is missed by more than `allowed`.
+    pub(crate) fn drawing_to_ink(&self, target: &Target, allowed: f64) -> (Spread, Vec<Miss>) {
+        let mut distances = Histogram::new();
+        let (mut max_mm, mut more) = (0.0_f64, false);
+        let mut misses = Vec::new();
+        for strokes in &target.pens {
+            let mut miss: Option<Miss> = None;
+            let mut missed_strokes = Vec::new();
+            for piece in &strokes.pieces {
+                let cell = piece.length / f64::from(piece.cells);
+                let first = piece.first_cell as usize;
+                for (index, covered) in self.covered[first..first + piece.cells as usize].iter().enumerate() {
+                    let unknown = *covered == f32::INFINITY;
+                    let mm = if unknown { self.smallest_radius } else { f64::from(*covered) };
+                    distances.add(mm, cell);
+                    max_mm = max_mm.max(mm);
+                    more |= unknown;
+                    if mm <= allowed {
+                        continue;
+                    }
+                    let stroke = piece.stroke as usize;
+                    missed_strokes.push(stroke);
+                    let miss = miss.get_or_insert(Miss {
+                        pen: strokes.pen,
+                        mm: 0.0,
+                        more: false,
+                        length: 0.0,
+                        strokes: 0,
+                        place: Place::default(),
+                    });
+                    miss.length += cell;
+                    miss.more |= unknown;
+                    if mm > miss.mm {
+                        miss.mm = mm;
+                        miss.place = Place {
+                            point_mm: Some(piece.at((index as f64 + 0.5) * cell)),
+                            stroke: Some(stroke),
+                            source: target.sources.get(stroke).copied(),
+                            ..Place::default()
+                        };
+                    }
+                }
+                missed_strokes.dedup();
+            }
+            missed_strokes.sort_unstable();
+            missed_strokes.dedup();
+            misses.extend(miss.map(|miss| Miss { strokes: missed_strokes.len() as u64, ..miss }));
+        }
+        let p99_mm = distances.percentile(0.99, max_mm);
+        (Spread { max_mm, p99_mm, more, unseen_mm: 0.5 * target.sparse_mm }, misses)
+    }
+}
+
+impl Chain {
+    fn new(anchor: Point, at: At, before: Option<Run>, moved: bool) -> Self {
+        Self { anchor, last: anchor, chords: 0, cone: None, error: 0.0, at, before, moved }
+    }
+
+    /// Takes the chord from `last` to `point` into the chain if one line from the anchor then still passes every point
+    /// within `merge`; a first chord always.
+    ///
+    /// Each point so far narrows the cone of the directions that pass it (Sklansky and Gonzalez 1980, Williams 1978). The points
+    /// come ever further from the anchor, so none lies beyond the line's end. The path is connected and stays in a
+    /// strip about the line from its beginning to its end, so each point of the line has one of the path beside it:
+    /// `merge` holds both ways.
+    fn extend(&mut self, point: Point, error: f64, merge: f64, longest: f64) -> bool {
+        let to = point - self.anchor;
+        let reach = to.hypot2().sqrt();
+        if self.chords > 0 {
+            let in_order = reach >= (self.last - self.anchor).hypot2().sqrt() && reach <= longest;
+            let inside = self.cone.is_none_or(|(right, left)| {
+                right.cross(to) >= 0.0 && to.cross(left) >= 0.0 && to.dot(right) > 0.0
+            });
+            if !(in_order && inside) {
+                return false;
+            }
+        }
+        if reach > merge {
+            let u = to / reach;
+            let sin = merge / reach;
+            let cos = (1.0 - sin * sin).sqrt();
+            let aside = sin * Vec2::new(-u.y, u.x);
+            let (right, left) = (cos * u - aside, cos * u + aside);
+            self.cone = Some(self.cone.map_or((right, left), |(old_right, old_left)| {
+                (
+                    if old_right.cross(right) > 0.0 { right } else { old_right },
+                    if left.cross(old_left) > 0.0 { left } else { old_left },
+                )
+            }));
+        }
+        self.last = point;
+        self.chords += 1;
+        self.error = self.error.max(error);
+        self.moved = true;
+        true
+    }
+
+    fn run(&self, merge: f64) -> Run {
+        let merged = if self.chords > 1 { merge } else { 0.0 };
+        Run { from: self.anchor, to: self.last, error: self.error + merged, at: self.at }
+    }
+}
+
+/// A run in the frame of one piece of the drawing.
+#[derive(Clone, Copy, Debug)]
+struct LocalRun {
+    ends: [(f64, f64); 2],
+    vector: (f64, f64),
+    /// 1 over the square of its length; 0 for a dot.
+    inverse: f64,
+    error: f64,
+}
+
+impl LocalRun {
+    fn new(piece: &Piece, run: &Run) -> Self {
+        let ends = [piece.local(run.from), piece.local(run.to)];
+        let vector = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
+        let square = vector.0 * vector.0 + vector.1 * vector.1;
+        let inverse = if square > 0.0 { 1.0 / square } else { 0.0 };
+        Self { ends, vector, inverse, error: run.error + piece.error }
+    }
+
+    /// Square of the distance from the piece's point `along` to the run.
+    fn square_at(&self, along: f64) -> f64 {
+        let (x, y) = (along - self.ends[0].0, -self.ends[0].1);
+        let t = ((x * self.vector.0 + y * self.vector.1) * self.inverse).clamp(0.0, 1.0);
+        let (x, y) = (x - t * self.vector.0, y - t * self.vector.1);
+        x * x + y * y
+    }
+
+    /// The cells that may be within `radius` of the run.
+    fn range(&self, piece: &Piece, radius: f64) -> std::ops::Range<usize> {
+        let [(x0, y0), (x1, y1)] = self.ends;
+        let (low, high) = (x0.min(x1) - radius, x0.max(x1) + radius);
+        if high < 0.0 || low > piece.length || y0.min(y1) > radius || y0.max(y1) < -radius {
+            return 0..0;
+        }
+        if piece.length == 0.0 {
+            return 0..1;
+        }
+        let per_mm = f64::from(piece.cells) / piece.length;
+        let first = (low * per_mm).floor().max(0.0) as usize;
+        first..((high * per_mm).ceil() as usize).min(piece.cells as usize)
+    }
+
+    /// Notes how well the run covers each cell near it.
+    fn cover(&self, piece: &Piece, radius: f64, covered: &mut [f32]) {
+        let range = self.range(piece, radius);
+        if range.is_empty() {
+            return;
+        }
+        let cell = piece.length / f64::from(piece.cells);
+        let mut at_start = self.square_at(range.start as f64 * cell);
+        let first = piece.first_cell as usize;
+        let cells = &mut covered[first + range.start..first + range.end];
+        for (index, covered) in (range.start + 1..).zip(cells) {
+            let at_end = self.square_at(index as f64 * cell);
+            keep(covered, at_start.max(at_end), self.error, radius);
+            at_start = at_end;
+        }
+    }
+
+    /// As [`Self::cover`], but only for the middle of each cell.
+    fn cover_middles(&self, piece: &Piece, radius: f64, covered: &mut [f32]) {
+        let cell = piece.length / f64::from(piece.cells);
+        for index in self.range(piece, radius) {
+            let square = self.square_at((index as f64 + 0.5) * cell);
+            keep(&mut covered[piece.first_cell as usize + index], square, self.error, radius);
+        }
+    }
+
+    /// Notes how well this run and the `next`, which begins where it ends, together cover the cell beside their joint.
+    fn cover_joint(&self, next: &Self, piece: &Piece, radius: f64, covered: &mut [f32]) {
+        let (along, across) = next.ends[0];
+        let middle = along.clamp(0.0, piece.length);
+        let joint = (along - middle) * (along - middle) + across * across;
+        if joint > radius * radius {
+            return;
+        }
+        let cell = piece.length / f64::from(piece.cells);
+        let last = f64::from(piece.cells - 1);
+        let index = if cell > 0.0 { (middle / cell).floor().clamp(0.0, last) } else { 0.0 };
+        let (start, end) = (index * cell, (index + 1.0) * cell);
+        let square = (self.square_at(start).max(next.square_at(end)))
+            .min(next.square_at(start).max(self.square_at(end)))
+            .max(joint);
+        let covered = &mut covered[piece.first_cell as usize + index as usize];
+        keep(covered, square, self.error.max(next.error), radius);
+    }
+}
+
+/// Keeps the smaller distance, never rounded down.
+fn keep(covered: &mut f32, square: f64, error: f64, radius: f64) {
+    let mm = square.sqrt() + error;
+    let rounded = (mm * (1.0 + f64::from(f32::EPSILON))) as f32;
+    if mm <= radius && rounded < *covered {
+        *covered = rounded;
+    }
+}
+
+/// The pieces about a run.
+struct Near<'a> {
+    pieces: &'a [Piece],
+    indices: &'a [u32],
+    tight: f64,
+}
+
+impl Near<'_> {
+    /// Hands on bounds of the distance of the run between two points whose own distances are known, with the lengths
+    /// they hold for. `bound` holds for the whole run.
+    fn bound(&self, ends: [(Point, f64); 2], bound: f64, halvings: u32, to: &mut impl FnMut(f64, f64)) {
+        let [(from, at_from), (end, at_end)] = ends;
+        let length = distance(from, end);
+        // Distance changes by no more than one goes: it is largest on the way where it rises from both ends alike.
+        let bound = bound.min(0.5 * (at_from + at_end + length));
+        if bound <= at_from.max(at_end) + self.tight || halvings == 0 {
+            to(bound, length);
+            return;
+        }
+        let middle = from.midpoint(end);
+        let mut at_middle = bound;
+        let mut bounds = [f64::INFINITY; 2];
+        for &index in self.indices {
+            let piece = &self.pieces[index as usize];
+            let here = piece.distance(piece.local(middle));
+            at_middle = at_middle.min(here);
+            for (bound, point) in bounds.iter_mut().zip([from, end]) {
+                if here < *bound {
+                    *bound = bound.min(here.max(piece.distance(piece.local(point))));
+                }
+            }
+        }
+        self.bound([ends[0], (middle, at_middle)], bounds[0], halvings - 1, to);
+        self.bound([(middle, at_middle), ends[1]], bounds[1], halvings - 1, to);
+    }
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    (b - a).hypot2().sqrt()
+}
