@@ -1,1 +1,90 @@
-//! HPGL and HP-GL/2: lexer, parser, interpreter, diagnostics, emitter
+//! HP-GL and HP-GL/2, the languages of pen plotters: from bytes to a [`Drawing`], and back.
+//!
+//! ```
+//! let reading = hpgl::read(b"IN;SP1;PU0,0;PD400,0,400,400;PU;", &hpgl::Options::default());
+//! assert_eq!(reading.pages[0].drawing.length(), 20.0); // mm
+//! assert!(reading.diagnostics.is_empty());
+//! ```
+//!
+//! Two passes, two types: [`parse`] turns bytes into a [`Syntax`] (commands, numbers, where they stand),
+//! [`interpret`] gives them their meaning. [`read`] does both at once without keeping the syntax. None of them
+//! fails: what cannot be understood is passed over and told in [`Diagnostic`]s. [`emit()`] writes a drawing as clean
+//! HP-GL.
+//!
+//! Positions come out in millimetres, plotter units times [`Options::plotter_unit_mm`] after the file's own scaling and
+//! rotation, y up.
+
+mod codes;
+mod diagnostics;
+mod emit;
+mod encoded;
+mod envelope;
+mod interpreter;
+mod lexer;
+mod mnemonics;
+mod parser;
+mod profile;
+mod syntax;
+mod units;
+
+pub use diagnostics::{Code, Diagnostic, Severity};
+pub use drawing::{Drawing, Point, Span};
+pub use emit::{EmitOptions, emit};
+pub use interpreter::interpret;
+pub use mnemonics::all as known_commands;
+pub use profile::Options;
+pub use syntax::{Command, Mnemonic, Syntax};
+pub use units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
+
+/// What a file draws, and what there is to say about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The sheets in order; at least one, even where nothing is drawn.
+    pub pages: Vec<Page>,
+    /// What was found, one entry a kind, in the order of their first places.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What the file consists of.
+    pub summary: Summary,
+}
+
+/// One sheet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Page {
+    /// Its ink; mm, y up, the origin where the file has it.
+    pub drawing: Drawing,
+}
+
+/// What a file consists of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// How many commands it has, known ones and unknown ones.
+    pub commands: usize,
+    /// The known commands in it, each with how often it occurs, in the order of the alphabet.
+    pub used: Vec<(Mnemonic, u64)>,
+}
+
+/// Takes a file apart without giving it a meaning; linear in its length.
+pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {
+    parser::Parser::new(bytes, options.label_terminator).collect()
+}
+
+/// Reads a file: parse and interpret in one go, in memory that follows the drawing.
+///
+/// The result is the same as that of [`interpret`] on [`parse`].
+pub fn read(bytes: &[u8], options: &Options) -> Reading {
+    let mut parser = parser::Parser::new(bytes, options.label_terminator);
+    let mut interpreter = interpreter::Interpreter::new(options);
+    let mut placed = 0;
+    loop {
+        let before = interpreter.pen_position();
+        let more = parser.next().map(|command| interpreter.execute(&command)).is_some();
+        if parser.findings.len() > placed {
+            parser.findings.place(placed, before);
+            placed = parser.findings.len();
+        }
+        if !more {
+            break;
+        }
+    }
+    interpreter.finish(parser.number(), parser.findings)
+}

@@ -1,0 +1,171 @@
+//! What a reader of a file is told: one [`Diagnostic`] a kind of finding, with its first place and a count.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use drawing::{Point, Span};
+
+use crate::codes::{CODES, Entry};
+use crate::syntax::Mnemonic;
+
+/// How much a finding matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// Worth knowing; the drawing is as the file says.
+    Note,
+    /// The file had to be interpreted: the drawing may differ from what was meant.
+    Warning,
+    /// Ink is lost: something that the file draws is not in the drawing.
+    Error,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        })
+    }
+}
+
+/// The stable name of a kind of finding, such as `H0101`.
+///
+/// A code never changes its meaning and is never given twice. [`Code::all`] lists them in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Code(pub(crate) u16);
+
+impl Code {
+    /// All codes, in the order of their numbers.
+    pub fn all() -> impl Iterator<Item = Self> {
+        CODES.iter().map(|entry| Self(entry.number))
+    }
+
+    /// The code of that name, in any case; nothing if there is none.
+    pub fn from_name(name: &str) -> Option<Self> {
+        CODES
+            .iter()
+            .find(|entry| entry.name.eq_ignore_ascii_case(name.trim()))
+            .map(|entry| Self(entry.number))
+    }
+
+    fn entry(self) -> &'static Entry {
+        // Codes are made from the table only, so the search succeeds; the first entry stands in for "not found".
+        CODES.iter().find(|entry| entry.number == self.0).unwrap_or(&CODES[0])
+    }
+
+    /// Its name, such as `H0101`.
+    pub fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// What it is about, in a few words.
+    pub fn title(self) -> &'static str {
+        self.entry().title
+    }
+
+    /// How much a finding of this kind matters.
+    pub fn severity(self) -> Severity {
+        self.entry().severity
+    }
+
+    /// What happened, what was done about it, and what can be done in the file; a paragraph.
+    pub fn explanation(self) -> &'static str {
+        self.entry().explanation
+    }
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// One kind of finding about one command, with its first place.
+///
+/// Findings of the same code about the same mnemonic are one diagnostic: `count` says how often.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnostic {
+    /// What kind of finding.
+    pub code: Code,
+    /// How much it matters.
+    pub severity: Severity,
+    /// The bytes of the first place.
+    pub span: Span,
+    /// Number of the command at the first place, counted from 1 over all commands of the file.
+    pub command: usize,
+    /// Where the pen stood at the first place, mm.
+    pub pen_position: Point,
+    /// What was found there.
+    pub message: String,
+    /// What could be done about it.
+    pub help: Option<String>,
+    /// How often it was found.
+    pub count: u64,
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}[{}] byte {}: {}", self.severity, self.code, self.span.start, self.message)?;
+        if self.count > 1 {
+            write!(f, " ({} times)", self.count)?;
+        }
+        Ok(())
+    }
+}
+
+/// Gathers findings, counting repeats of the same code about the same mnemonic.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Findings {
+    found: Vec<Diagnostic>,
+    by_kind: BTreeMap<(Code, Mnemonic), usize>,
+}
+
+impl Findings {
+    /// Counts a finding; `message` is asked for at its first place only.
+    pub(crate) fn report(
+        &mut self,
+        code: Code,
+        mnemonic: Mnemonic,
+        span: Span,
+        command: usize,
+        pen_position: Point,
+        message: impl FnOnce() -> (String, Option<String>),
+    ) {
+        if let Some(&index) = self.by_kind.get(&(code, mnemonic)) {
+            self.found[index].count += 1;
+            return;
+        }
+        let (message, help) = message();
+        self.by_kind.insert((code, mnemonic), self.found.len());
+        self.found.push(Diagnostic {
+            code,
+            severity: code.severity(),
+            span,
+            command,
+            pen_position,
+            message,
+            help,
+            count: 1,
+        });
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.found.len()
+    }
+
+    /// Tells the findings from `index` on where the pen stood when they were met.
+    pub(crate) fn place(&mut self, index: usize, pen_position: Point) {
+        for diagnostic in &mut self.found[index..] {
+            diagnostic.pen_position = pen_position;
+        }
+    }
+
+    pub(crate) fn as_slice(&self) -> &[Diagnostic] {
+        &self.found
+    }
+
+    pub(crate) fn into_vec(self) -> Vec<Diagnostic> {
+        self.found
+    }
+}

@@ -1,0 +1,255 @@
+//! Polyline encoded (`PE`): where its data end, and what numbers and flags they hold.
+//!
+//! A number is written in digits of base 64 or, after the flag `7`, of base 32, the least significant first. Base 64:
+//! all but the last digit are the bytes 63 to 126, the last one 191 to 254. Base 32: 63 to 94, and 95 to 126. Its
+//! lowest bit is the sign, the rest the size.
+
+use crate::envelope;
+use crate::mnemonics::form_of;
+use crate::syntax::Mnemonic;
+
+/// What one byte of the data can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Digit,
+    Flag,
+    Passed,
+    End,
+}
+
+fn kind(byte: u8) -> Kind {
+    match byte {
+        63..=126 | 191..=254 => Kind::Digit,
+        27 => Kind::End,
+        0..=32 | 127..=160 => Kind::Passed,
+        _ => match byte & 0x7f {
+            b':' | b'<' | b'=' | b'>' | b'7' => Kind::Flag,
+            _ => Kind::End,
+        },
+    }
+}
+
+/// The byte that the data hold at `at`, and how many bytes of the file it takes.
+fn byte_at(bytes: &[u8], at: usize, reencoded: bool) -> Option<(u8, usize)> {
+    let &byte = bytes.get(at)?;
+    match (byte, bytes.get(at + 1)) {
+        (0xc2 | 0xc3, Some(&next)) if reencoded && (0x80..=0xbf).contains(&next) => {
+            Some((((byte & 3) << 6) | (next & 0x3f), 2))
+        }
+        _ => Some((byte, 1)),
+    }
+}
+
+/// The length of the data at the start of `bytes`.
+///
+/// It is the first byte that cannot be data, as a rule the semicolon. Where that is missing, the letters of the next
+/// command look like the beginning of a number: then the data end after their last whole number. `is_reencoded` is
+/// asked at the first byte pair that could be one byte re-encoded as UTF-8.
+pub(crate) fn scan(bytes: &[u8], mut is_reencoded: impl FnMut() -> bool) -> usize {
+    let mut at = 0;
+    // After the last whole number or flag.
+    let mut whole = 0;
+    let mut base32 = false;
+    let mut reencoded = None;
+    while let Some(&raw) = bytes.get(at) {
+        let suspicious =
+            matches!(raw, 0xc2 | 0xc3) && bytes.get(at + 1).is_some_and(|b| (0x80..=0xbf).contains(b));
+        let damaged = suspicious && *reencoded.get_or_insert_with(&mut is_reencoded);
+        let Some((byte, length)) = byte_at(bytes, at, damaged) else { break };
+        match kind(byte) {
+            Kind::Digit => {
+                at += length;
+                if if base32 { (95..=126).contains(&byte) } else { byte >= 191 } {
+                    whole = at;
+                }
+            }
+            Kind::Flag => {
+                base32 |= byte & 0x7f == b'7';
+                at += length;
+                whole = at;
+            }
+            Kind::Passed => at += length,
+            Kind::End => match envelope::device_control(&bytes[at..]) {
+                Some(control) => at += control.bytes,
+                None => break,
+            },
+        }
+    }
+    let rest = bytes[whole..at].trim_ascii();
+    let next_name = rest.get(..2).map(|pair| Mnemonic([pair[0], pair[1]]));
+    let a_command = next_name.is_some_and(|name| form_of(name).is_some());
+    if a_command && (rest.len() == 2 || bytes.get(at) != Some(&b';')) {
+        at = whole;
+    }
+    at
+}
+
+/// A flag or a number of the data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Item {
+    /// The pen to go on with.
+    Pen(f64),
+    /// The next pair is travelled with the pen up.
+    Up,
+    /// The next pair is absolute.
+    Absolute,
+    /// A coordinate, in current units.
+    Coordinate(f64),
+    /// A number of fractional bits that the language does not allow; it stays as it was.
+    BadFraction(f64),
+    /// A number without its last digit.
+    Unfinished,
+}
+
+/// Takes the data apart.
+#[derive(Clone, Debug)]
+pub(crate) struct Decoder<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    reencoded: bool,
+    base32: bool,
+    /// What a whole number is multiplied by.
+    scale: f64,
+}
+
+/// A whole number, or why there is none.
+enum Number {
+    Value(f64),
+    Unfinished,
+    None,
+}
+
+impl<'a> Decoder<'a> {
+    pub(crate) fn new(bytes: &'a [u8], reencoded: bool) -> Self {
+        Self { bytes, at: 0, reencoded, base32: false, scale: 1.0 }
+    }
+
+    fn number(&mut self) -> Number {
+        let mut value: u64 = 0;
+        let mut shift = 0;
+        let mut too_long = false;
+        let mut begun = false;
+        while let Some((byte, length)) = byte_at(self.bytes, self.at, self.reencoded) {
+            let (digit, last) = match (kind(byte), self.base32) {
+                (Kind::Passed, _) => {
+                    self.at += length;
+                    continue;
+                }
+                (Kind::Digit, false) if byte >= 191 => (byte - 191, true),
+                (Kind::Digit, false) => (byte - 63, false),
+                // The eighth bit is lost on the lines that base 32 is for.
+                (Kind::Digit, true) if byte & 0x7f >= 95 => ((byte & 0x7f) - 95, true),
+                (Kind::Digit, true) => ((byte & 0x7f) - 63, false),
+                (Kind::End, _) if byte == 0x1b => {
+                    self.at += envelope::device_control(&self.bytes[self.at..]).map_or(1, |c| c.bytes);
+                    continue;
+                }
+                _ => break,
+            };
+            self.at += length;
+            begun = true;
+            let width = if self.base32 { 5 } else { 6 };
+            if shift + width <= 60 {
+                value |= u64::from(digit) << shift;
+                shift += width;
+            } else {
+                too_long |= digit > 0;
+            }
+            if last {
+                let size = if too_long { f64::INFINITY } else { (value >> 1) as f64 };
+                return Number::Value(if value & 1 == 1 { -size } else { size });
+            }
+        }
+        if begun { Number::Unfinished } else { Number::None }
+    }
+}
+
+impl Iterator for Decoder<'_> {
+    type Item = Item;
+
+    fn next(&mut self) -> Option<Item> {
+        loop {
+            let (byte, length) = byte_at(self.bytes, self.at, self.reencoded)?;
+            let flag = if kind(byte) == Kind::Flag { byte & 0x7f } else { 0 };
+            if flag == 0 {
+                return match self.number() {
+                    Number::Value(value) => Some(Item::Coordinate(value * self.scale)),
+                    Number::Unfinished => Some(Item::Unfinished),
+                    Number::None => {
+                        if self.at >= self.bytes.len() {
+                            return None;
+                        }
+                        self.at += 1;
+                        continue;
+                    }
+                };
+            }
+            self.at += length;
+            match flag {
+                b'<' => return Some(Item::Up),
+                b'=' => return Some(Item::Absolute),
+                b'7' => self.base32 = true,
+                _ => {
+                    let value = match self.number() {
+                        Number::Value(value) => value,
+                        Number::Unfinished => return Some(Item::Unfinished),
+                        Number::None => continue,
+                    };
+                    if flag == b':' {
+                        return Some(Item::Pen(value));
+                    }
+                    if value.abs() > 26.0 {
+                        return Some(Item::BadFraction(value));
+                    }
+                    // A power of two: exact, and so is the product with any coordinate.
+                    self.scale = libm::ldexp(1.0, -(value as i32));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn items(bytes: &[u8]) -> Vec<Item> {
+        Decoder::new(bytes, false).collect()
+    }
+
+    #[test]
+    fn numbers_of_base_64() {
+        // 800 = 32 + 12 * 64; half of it is 400, the sign bit 0.
+        assert_eq!(items(&[63 + 32, 191 + 12, 191]), [Item::Coordinate(400.0), Item::Coordinate(0.0)]);
+        // 801 has the sign bit.
+        assert_eq!(items(&[63 + 33, 191 + 12]), [Item::Coordinate(-400.0)]);
+    }
+
+    #[test]
+    fn numbers_of_base_32() {
+        // 800 = 0 + 25 * 32
+        assert_eq!(items(&[b'7', 63, 95 + 25]), [Item::Coordinate(400.0)]);
+    }
+
+    #[test]
+    fn fractions_divide() {
+        // `>` 8 bits (16 = 8 << 1), then 400 * 256.
+        let encoded = (400_u32 * 256) << 1;
+        let digits =
+            [63 + (encoded & 63) as u8, 63 + (encoded >> 6 & 63) as u8, 191 + (encoded >> 12 & 63) as u8];
+        let mut data = vec![b'>', 191 + 16];
+        data.extend(digits);
+        assert_eq!(items(&data), [Item::Coordinate(400.0)]);
+    }
+
+    #[test]
+    fn a_missing_terminator_gives_the_next_command_back() {
+        let data = [95, 203, 191, b'P', b'U', b';'];
+        assert_eq!(scan(&data, || false), 3);
+        let data = [95, 203, 191, b'P', b'D', b'4', b'0'];
+        assert_eq!(scan(&data, || false), 3);
+        // Not a command: the letters are an unfinished number.
+        let data = [95, 203, 191, b'Q', b'Q', b';'];
+        assert_eq!(scan(&data, || false), 5);
+    }
+}

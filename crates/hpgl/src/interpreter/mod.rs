@@ -1,0 +1,259 @@
+//! From commands to ink: the state of a plotter, and what each command does to it.
+
+mod arcs;
+mod frame;
+mod pages;
+mod polygon;
+mod setup;
+mod tracer;
+mod travel;
+
+use drawing::{Drawing, Pen, Point, Span};
+
+use crate::codes;
+use crate::diagnostics::{Code, Findings};
+use crate::profile::Options;
+use crate::syntax::{Command, Mnemonic, Syntax};
+use crate::{Page, Reading, Summary};
+use frame::Frame;
+use polygon::Polygon;
+use tracer::Tracer;
+
+/// Gives the commands of a file their meaning.
+pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Reading {
+    let mut interpreter = Interpreter::new(options);
+    let mut findings = syntax.findings.clone();
+    let mut placed = 0;
+    for (command, found) in syntax.commands().zip(syntax.findings_until()) {
+        if found > placed {
+            findings.place(placed, interpreter.pen_position());
+            placed = found;
+        }
+        interpreter.execute(&command);
+    }
+    findings.place(placed, interpreter.pen_position());
+    interpreter.finish(syntax.command_count, findings)
+}
+
+/// Which pen the plotter holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Holder {
+    /// No `SP` yet.
+    Unsaid,
+    /// `SP0`.
+    Empty,
+    /// A pen.
+    Holds(u16),
+}
+
+/// The state of a plotter while it draws a file.
+pub(crate) struct Interpreter {
+    frame: Frame,
+    holder: Holder,
+    down: bool,
+    relative: bool,
+    /// The parameter of `CT` is 1: chords are given by how far they leave their arc.
+    chords_by_deviation: bool,
+    /// Where the pen is, plotter units of the turned frame.
+    position: Point,
+    /// The same place on the page, mm.
+    position_mm: Point,
+    tracer: Tracer,
+    polygon: Polygon,
+    pages: Vec<Page>,
+    findings: Findings,
+    /// How often each command occurred, by the index of its letters.
+    used: Vec<u64>,
+    mnemonic: Mnemonic,
+    span: Span,
+    number: usize,
+}
+
+impl Interpreter {
+    pub(crate) fn new(options: &Options) -> Self {
+        let frame = Frame::new(options);
+        let position_mm = frame.mm_of_plu(Point::ZERO);
+        Self {
+            frame,
+            holder: Holder::Unsaid,
+            down: false,
+            relative: false,
+            chords_by_deviation: false,
+            position: Point::ZERO,
+            position_mm,
+            tracer: Tracer::new(),
+            polygon: Polygon::default(),
+            pages: Vec::new(),
+            findings: Findings::default(),
+            used: vec![0; 26 * 26],
+            mnemonic: Mnemonic::NONE,
+            span: Span::default(),
+            number: 0,
+        }
+    }
+
+    /// Where the pen is, mm.
+    pub(crate) fn pen_position(&self) -> Point {
+        self.position_mm
+    }
+
+    /// Files a finding about the command at work.
+    fn report(&mut self, code: Code, message: impl FnOnce() -> String) {
+        self.report_at(code, self.span, message);
+    }
+
+    fn report_at(&mut self, code: Code, span: Span, message: impl FnOnce() -> String) {
+        self.findings.report(code, self.mnemonic, span, self.number, self.position_mm, || (message(), None));
+    }
+
+    /// Files a finding about a setting that the command at work cannot make.
+    fn bad_parameters(&mut self, expected: &str) {
+        let mnemonic = self.mnemonic;
+        self.report(codes::BAD_PARAMETERS, || format!("`{mnemonic}` takes {expected}; it has no effect"));
+    }
+
+    /// Files a finding about ink that the command at work does not draw.
+    fn lost(&mut self, expected: &str) {
+        let mnemonic = self.mnemonic;
+        self.report(codes::LOST_DRAWING_COMMAND, || {
+            format!("`{mnemonic}` takes {expected}; it draws nothing")
+        });
+    }
+
+    /// Does what a command says.
+    pub(crate) fn execute(&mut self, command: &Command<'_>) {
+        let mnemonic = command.mnemonic;
+        let goes_on = self.number == command.number;
+        self.mnemonic = mnemonic;
+        self.span = command.span;
+        self.number = command.number;
+        self.tracer.set_command(command.span);
+        let [first, second] = mnemonic.0;
+        if first >= b'A' && !goes_on {
+            self.used[usize::from(first - b'A') * 26 + usize::from(second - b'A')] += 1;
+        }
+        let p = command.parameters;
+        match &mnemonic.0 {
+            b"PU" => self.pen_up(p),
+            b"PD" => self.pen_down(p),
+            b"PA" => self.plot_absolute(p),
+            b"PR" => self.plot_relative(p),
+            b"PE" => self.polyline_encoded(command.text, command.reencoded),
+            b"AA" => self.arc_absolute(p),
+            b"AR" => self.arc_relative(p),
+            b"AT" => self.arc_through_absolute(p),
+            b"RT" => self.arc_through_relative(p),
+            b"BZ" => self.bezier_absolute(p),
+            b"BR" => self.bezier_relative(p),
+            b"CI" => self.circle(p),
+            b"EA" => self.edge_rectangle_absolute(p),
+            b"ER" => self.edge_rectangle_relative(p),
+            b"RA" => self.fill_rectangle_absolute(p),
+            b"RR" => self.fill_rectangle_relative(p),
+            b"EW" => self.edge_wedge(p),
+            b"WG" => self.fill_wedge(p),
+            b"CT" => self.chord_type(p),
+            b"PM" => self.polygon_mode(p),
+            b"EP" => self.edge_polygon(),
+            b"FP" => self.fill_polygon(p),
+            b"SP" => self.select_pen(p),
+            b"IN" => self.initialise(),
+            b"DF" => self.set_defaults(),
+            b"IP" => self.input_points(p),
+            b"IR" => self.input_points_relative(p),
+            b"SC" => self.scale(p),
+            b"RO" => self.rotate(p),
+            b"IW" => self.input_window(p),
+            b"PS" => self.page_size(p),
+            b"PG" | b"AF" | b"AH" | b"FR" => self.advance_page(),
+            b"BP" => self.begin_plot(),
+            b"LB" | b"BL" => {
+                let text = command.text;
+                self.report(codes::LABEL_NOT_DRAWN, || {
+                    format!("the label `{}` is not drawn", text.escape_ascii())
+                });
+            }
+            b"OA" | b"OC" | b"OD" | b"OE" | b"OF" | b"OG" | b"OH" | b"OI" | b"OK" | b"OL" | b"OO" | b"OP"
+            | b"OS" | b"OT" | b"OW" | b"DP" | b"DC" => {
+                self.report(codes::OUTPUT_COMMAND, || format!("`{mnemonic}` has no meaning in a file"));
+            }
+            _ if mnemonic == Mnemonic::RESET => self.reset(),
+            _ if mnemonic == Mnemonic::PICTURE_FRAME => self.picture_frame(p),
+            _ => {}
+        }
+        for _ in 0..self.tracer.take_clipped() {
+            self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
+        }
+    }
+
+    /// The pen that draws, or nothing where there is none; either way it is told.
+    fn ink(&mut self) -> bool {
+        match self.holder {
+            Holder::Holds(_) => true,
+            Holder::Unsaid => {
+                self.report(codes::NO_PEN_SELECTED, || "no SP has selected a pen: pen 1 is taken".into());
+                self.hold(1);
+                true
+            }
+            Holder::Empty => {
+                self.report(codes::PEN_PUT_AWAY, || "the pen is put away (SP0): nothing is drawn".into());
+                false
+            }
+        }
+    }
+
+    fn hold(&mut self, pen: u16) {
+        self.holder = if pen == 0 { Holder::Empty } else { Holder::Holds(pen) };
+        if pen == 0 {
+            self.tracer.finish();
+        } else {
+            self.tracer.set_pen(Pen(pen));
+        }
+    }
+
+    /// Puts the pen at a place without drawing.
+    fn place(&mut self, position: Point) {
+        self.position = position;
+        self.position_mm = self.frame.mm_of_plu(position);
+    }
+
+    /// Whether a point can be meant; if not, it is told.
+    fn is_sane(&mut self, position: Point) -> bool {
+        let sane = position.x.abs() <= crate::units::SANE_PLU && position.y.abs() <= crate::units::SANE_PLU;
+        if !sane {
+            let mnemonic = self.mnemonic;
+            self.report(codes::COORDINATE_OUT_OF_RANGE, || {
+                format!(
+                    "`{mnemonic}` leads to ({:.4e}, {:.4e}) plotter units; the point is left out",
+                    position.x, position.y
+                )
+            });
+        }
+        sane
+    }
+
+    /// The end of the file.
+    pub(crate) fn finish(mut self, commands: usize, syntax_findings: Findings) -> Reading {
+        if self.polygon.is_open() {
+            self.report(codes::OPEN_POLYGON, || "the file ends inside a polygon (PM0 without PM2)".into());
+        }
+        let strokes = self.tracer.take_page();
+        if !strokes.is_empty() || self.pages.is_empty() {
+            self.pages.push(Page { drawing: Drawing { strokes } });
+        }
+        self.report_pages();
+        let mut diagnostics = syntax_findings.into_vec();
+        diagnostics.extend(self.findings.into_vec());
+        diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
+        let used = (0_u16..26 * 26)
+            .map(|index| {
+                (
+                    Mnemonic([b'A' + (index / 26) as u8, b'A' + (index % 26) as u8]),
+                    self.used[usize::from(index)],
+                )
+            })
+            .filter(|&(_, count)| count > 0)
+            .collect();
+        Reading { pages: self.pages, diagnostics, summary: Summary { commands, used } }
+    }
+}

@@ -1,0 +1,46 @@
+//! Sheets: `PG AF AH FR BP`, and resets of the wrappers.
+
+use drawing::Drawing;
+
+use super::Interpreter;
+use crate::Page;
+use crate::codes;
+
+impl Interpreter {
+    /// Ends the sheet if anything is on it.
+    fn end_page(&mut self) {
+        if !self.tracer.has_ink() {
+            return;
+        }
+        let strokes = self.tracer.take_page();
+        self.pages.push(Page { drawing: Drawing { strokes } });
+    }
+
+    /// `PG` and its like: a new sheet; coordinates go on.
+    pub(super) fn advance_page(&mut self) {
+        self.tracer.finish();
+        self.down = false;
+        self.end_page();
+    }
+
+    /// `BP`: a new plot on a new sheet, with everything as at the start.
+    pub(super) fn begin_plot(&mut self) {
+        self.advance_page();
+        self.initialise();
+    }
+
+    /// A reset of the printer, or the end of its job.
+    pub(super) fn reset(&mut self) {
+        self.advance_page();
+        self.frame.forget_page();
+        self.initialise();
+    }
+
+    /// Says so where there is more than one sheet.
+    pub(super) fn report_pages(&mut self) {
+        let count = self.pages.len();
+        if count > 1 {
+            self.report(codes::SEVERAL_PAGES, || format!("the file draws {count} pages"));
+        }
+    }
+}

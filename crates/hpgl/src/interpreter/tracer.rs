@@ -1,0 +1,215 @@
+//! The pen on the paper: joins pen-down movement to strokes, clipped to the window; mm.
+
+use drawing::{Pen, Point, Rect, Segment, Span, Stroke, clip_segment};
+
+/// Steps shorter than this (mm) are rounding, not movement.
+const NO_STEP: f64 = 1e-9;
+
+fn same(a: Point, b: Point) -> bool {
+    (a.x - b.x).abs() < NO_STEP && (a.y - b.y).abs() < NO_STEP
+}
+
+/// Gathers strokes.
+#[derive(Clone, Debug)]
+pub(crate) struct Tracer {
+    pub(crate) strokes: Vec<Stroke>,
+    /// The pen in use.
+    pen: Pen,
+    /// The command at work.
+    command: Span,
+    /// Vertices of the stroke being drawn, as long as it is straight.
+    points: Vec<Point>,
+    /// The stroke being drawn, once it has a curve.
+    curved: Option<Stroke>,
+    /// The bytes of the stroke being drawn.
+    source: Span,
+    /// The pen came down at the only point so far: it leaves a dot.
+    dot: bool,
+    clip: Option<Rect>,
+    /// How often ink was cut off since this was last looked at.
+    clipped: u64,
+}
+
+impl Tracer {
+    pub(crate) fn new() -> Self {
+        Self {
+            strokes: Vec::new(),
+            pen: Pen(1),
+            command: Span::default(),
+            points: Vec::new(),
+            curved: None,
+            source: Span::default(),
+            dot: false,
+            clip: None,
+            clipped: 0,
+        }
+    }
+
+    /// The command that draws from now on.
+    #[inline]
+    pub(crate) fn set_command(&mut self, span: Span) {
+        self.command = span;
+    }
+
+    /// Draws with that pen from now on.
+    pub(crate) fn set_pen(&mut self, pen: Pen) {
+        if pen != self.pen {
+            self.finish();
+            self.pen = pen;
+        }
+    }
+
+    /// Clips to that rectangle from now on; an empty one holds nothing.
+    pub(crate) fn set_clip(&mut self, clip: Option<Rect>) {
+        if clip != self.clip {
+            self.finish();
+            self.clip = clip;
+        }
+    }
+
+    pub(crate) fn take_clipped(&mut self) -> u64 {
+        std::mem::take(&mut self.clipped)
+    }
+
+    /// Whether anything is drawn on this page.
+    pub(crate) fn has_ink(&self) -> bool {
+        !self.strokes.is_empty() || !self.points.is_empty() || self.curved.is_some()
+    }
+
+    /// Puts the pen down: a dot, unless it moves.
+    pub(crate) fn lower(&mut self, at: Point) {
+        self.finish();
+        if self.clip.is_some_and(|clip| !holds(clip, at)) {
+            self.clipped += 1;
+            return;
+        }
+        self.begin(at);
+        self.dot = true;
+    }
+
+    /// Forgets that the pen came down here, if it has not moved.
+    pub(crate) fn discard_dot(&mut self) {
+        if self.dot && self.points.len() == 1 {
+            self.points.clear();
+            self.dot = false;
+        }
+    }
+
+    /// A dot by itself.
+    pub(crate) fn dot(&mut self, at: Point) {
+        self.lower(at);
+        self.finish();
+    }
+
+    fn begin(&mut self, at: Point) {
+        self.points.clear();
+        self.points.push(at);
+        self.source = self.command;
+        self.dot = false;
+    }
+
+    /// Draws a straight line.
+    #[inline]
+    pub(crate) fn line(&mut self, from: Point, to: Point) {
+        if let Some(clip) = self.clip
+            && !(holds(clip, from) && holds(clip, to))
+        {
+            self.segment(&Segment::Line(drawing::Line::new(from, to)));
+            return;
+        }
+        self.append_line(from, to);
+    }
+
+    #[inline]
+    fn append_line(&mut self, from: Point, to: Point) {
+        self.connect(from);
+        match &mut self.curved {
+            Some(stroke) => {
+                if !same(stroke.end(), to) {
+                    stroke.line_to(to);
+                }
+            }
+            None => {
+                if !self.points.last().is_some_and(|&last| same(last, to)) {
+                    self.points.push(to);
+                }
+            }
+        }
+        self.source.end = self.command.end;
+    }
+
+    /// Sees to it that the stroke being drawn ends at `from`.
+    #[inline]
+    fn connect(&mut self, from: Point) {
+        let end = match &self.curved {
+            Some(stroke) => Some(stroke.end()),
+            None => self.points.last().copied(),
+        };
+        if !end.is_some_and(|end| same(end, from)) {
+            self.finish();
+            self.begin(from);
+        }
+    }
+
+    /// Draws a line, an arc or a curve.
+    pub(crate) fn segment(&mut self, segment: &Segment) {
+        let Some(clip) = self.clip else {
+            self.append(segment);
+            return;
+        };
+        let parts = clip_segment(segment, clip);
+        if parts.as_slice() != [(0.0, 1.0)] {
+            self.clipped += 1;
+        }
+        for (from, to) in parts {
+            self.append(&if (from, to) == (0.0, 1.0) { *segment } else { segment.part(from, to) });
+        }
+    }
+
+    fn append(&mut self, segment: &Segment) {
+        if let Segment::Line(line) = segment {
+            self.append_line(line.p0, line.p1);
+            return;
+        }
+        self.connect(segment.start());
+        let stroke = match self.curved.take() {
+            Some(mut stroke) => {
+                stroke.push(*segment);
+                Some(stroke)
+            }
+            None => {
+                Stroke::polyline(self.pen, std::mem::take(&mut self.points), self.source).map(|mut stroke| {
+                    stroke.push(*segment);
+                    stroke
+                })
+            }
+        };
+        self.curved = stroke;
+        self.source.end = self.command.end;
+    }
+
+    /// Lifts the pen: what was drawn is a stroke.
+    #[inline]
+    pub(crate) fn finish(&mut self) {
+        if let Some(mut stroke) = self.curved.take() {
+            stroke.source = self.source;
+            self.strokes.push(stroke);
+        } else if self.points.len() > 1 || (self.dot && !self.points.is_empty()) {
+            // An exact copy, so that strokes hold no spare memory; the scratch list is used again.
+            self.strokes.extend(Stroke::polyline(self.pen, self.points.as_slice().to_vec(), self.source));
+        }
+        self.points.clear();
+        self.dot = false;
+    }
+
+    /// Ends the page.
+    pub(crate) fn take_page(&mut self) -> Vec<Stroke> {
+        self.finish();
+        std::mem::take(&mut self.strokes)
+    }
+}
+
+#[inline]
+fn holds(clip: Rect, p: Point) -> bool {
+    clip.x0 <= p.x && p.x <= clip.x1 && clip.y0 <= p.y && p.y <= clip.y1 && clip.x1 > clip.x0
+}

@@ -1,0 +1,154 @@
+//! The parser outside HP-GL: PCL, RTL, job control, and the ways in and out.
+
+use drawing::Span;
+
+use super::{Head, Language, Parser};
+use crate::codes;
+use crate::envelope::{self, DeviceControl, Escape};
+use crate::lexer::{Class, class};
+use crate::syntax::Mnemonic;
+
+/// Plotter units in a decipoint, the unit of picture frames: 1016 / 720.
+const PLU_PER_DECIPOINT: f64 = 1016.0 / 720.0;
+
+impl Parser<'_> {
+    /// At ESC, in any language.
+    pub(super) fn escape(&mut self) -> Option<Head> {
+        let start = self.at;
+        let (found, length) = envelope::escape(&self.bytes[start..]);
+        self.at = start + length;
+        let span = Span { start, end: self.at };
+        match found {
+            Escape::DeviceControl(control) => {
+                self.report_device_control(start, control);
+                None
+            }
+            Escape::EnterHpGl(parameter) => {
+                self.language = Language::HpGl;
+                self.parameters.push(f64::from(parameter));
+                Some(self.wrapper(Mnemonic::ENTER, start))
+            }
+            Escape::LeaveHpGl => {
+                self.language = Language::Pcl;
+                None
+            }
+            Escape::EndOfJob => {
+                self.language = Language::Job;
+                self.restore_terminator();
+                Some(self.wrapper(Mnemonic::RESET, start))
+            }
+            Escape::Reset => {
+                self.restore_terminator();
+                self.language = if self.hpgl_is_entered_later() { Language::Pcl } else { Language::HpGl };
+                Some(self.wrapper(Mnemonic::RESET, start))
+            }
+            Escape::Pcl(pcl) => {
+                if pcl.binary > 0 {
+                    self.report(codes::RASTER, Mnemonic::NONE, span, || {
+                        ("raster or other binary data is skipped".into(), None)
+                    });
+                }
+                let (width, height) = pcl.frame;
+                if width.is_none() && height.is_none() {
+                    return None;
+                }
+                let plu = |decipoints: Option<f64>| decipoints.map_or(f64::NAN, |d| d * PLU_PER_DECIPOINT);
+                self.parameters.extend([plu(width), plu(height)]);
+                Some(self.wrapper(Mnemonic::PICTURE_FRAME, start))
+            }
+            Escape::Other => {
+                self.report(codes::STRAY_ESCAPE, Mnemonic::NONE, span, || {
+                    ("an unknown escape sequence is skipped".into(), None)
+                });
+                None
+            }
+        }
+    }
+
+    fn restore_terminator(&mut self) {
+        self.terminator = self.default_terminator;
+    }
+
+    fn report_device_control(&mut self, start: usize, control: DeviceControl) {
+        if !control.terminated {
+            let span = Span { start, end: start + control.bytes };
+            self.report(codes::DEVICE_CONTROL_WITHOUT_COLON, Mnemonic::NONE, span, || {
+                (
+                    "a device control sequence lacks its colon; it is ended where its parameters end".into(),
+                    None,
+                )
+            });
+        }
+    }
+
+    /// Whether HP-GL/2 is entered after this place by `ESC %#B` or by job control; if not, what looks like PCL cannot
+    /// be meant as such.
+    fn hpgl_is_entered_later(&mut self) -> bool {
+        let known = match self.next_entry {
+            Some(None) => Some(false),
+            Some(Some(place)) if place >= self.at => Some(true),
+            _ => None,
+        };
+        known.unwrap_or_else(|| {
+            let found = (self.at..self.bytes.len()).find(|&at| {
+                let rest = &self.bytes[at..];
+                match rest[0] {
+                    0x1b => {
+                        rest.get(1) == Some(&b'%') && matches!(envelope::escape(rest).0, Escape::EnterHpGl(_))
+                    }
+                    b'L' => rest.starts_with(b"LANGUAGE"),
+                    _ => false,
+                }
+            });
+            self.next_entry = Some(found);
+            found.is_some()
+        })
+    }
+
+    /// One step in PCL or RTL: everything up to the next ESC is text on the page, which no pen draws.
+    #[expect(clippy::option_option, reason = "end of file and nothing yet are different answers")]
+    pub(super) fn pcl(&mut self) -> Option<Option<Head>> {
+        let start = self.at;
+        let rest = &self.bytes[start..];
+        if rest.is_empty() {
+            return None;
+        }
+        let length = rest.iter().position(|&b| b == 0x1b).unwrap_or(rest.len());
+        self.at = start + length;
+        if rest[..length].iter().any(u8::is_ascii_graphic) {
+            let span = Span { start, end: self.at };
+            self.report(codes::PCL_TEXT, Mnemonic::NONE, span, || {
+                ("text outside HP-GL/2 (PCL) is not drawn".into(), None)
+            });
+        }
+        if self.at == self.bytes.len() { None } else { Some(self.escape()) }
+    }
+
+    /// One step in job control: lines that begin with `@PJL`.
+    #[expect(clippy::option_option, reason = "end of file and nothing yet are different answers")]
+    pub(super) fn job(&mut self) -> Option<Option<Head>> {
+        let rest = &self.bytes[self.at..];
+        let &byte = rest.first()?;
+        if let Some((length, language)) = envelope::job_line(rest) {
+            self.at += length;
+            if let Some(language) = language {
+                let hpgl = language.to_ascii_uppercase().starts_with(b"HPGL");
+                self.language = if hpgl { Language::HpGl } else { Language::Pcl };
+            }
+            return Some(None);
+        }
+        match class(byte) {
+            Class::Escape => Some(self.escape()),
+            Class::Blank | Class::LineEnd | Class::Control => {
+                self.at += 1;
+                Some(None)
+            }
+            // A plotter's own language needs no announcement.
+            _ => {
+                self.language = Language::HpGl;
+                // The parser's own test for `@PJL` has failed here, so that this cannot go round in circles.
+                Some(None)
+            }
+        }
+    }
+}
