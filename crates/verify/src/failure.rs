@@ -143,7 +143,10 @@ pub enum Violation {
         pen: u16,
     },
     /// Ink too far from the drawing.
-    #[error("ink of pen {pen} strays {distance_mm:.4} mm from the drawing {}, {allowed_mm:.4} mm is allowed", stage(*.rounded))]
+    #[error(
+        "ink of pen {pen} strays {distance_mm:.4} mm from the drawing {} where {allowed_mm:.4} mm are allowed",
+        stage(*.rounded)
+    )]
     Strays {
         /// The pen.
         pen: u16,
@@ -156,9 +159,10 @@ pub enum Violation {
     },
     /// A part of the drawing too far from any ink.
     #[error(
-        "{missed_mm:.2} mm of pen {pen} in {strokes} stroke{} is missed by up to {}{distance_mm:.4} mm {}; {allowed_mm:.4} mm is allowed",
+        "{missed_mm:.2} mm of pen {pen} in {strokes} stroke{} are missed, by {} {distance_mm:.4} mm {} \
+         where {allowed_mm:.4} mm are allowed",
         if *.strokes == 1 { "" } else { "s" },
-        if *.more { "more than " } else { "" },
+        if *.more { "more than" } else { "up to" },
         stage(*.rounded)
     )]
     Missed {

@@ -57,6 +57,11 @@ impl Piece {
         (beyond * beyond + across * across).sqrt() + self.error
     }
 
+    /// The distances of two points from the stroke.
+    pub(crate) fn distances(&self, points: [Point; 2]) -> [f64; 2] {
+        points.map(|point| self.distance(self.local(point)))
+    }
+
     pub(crate) fn bounds(&self) -> Rect {
         Rect::from_points(self.start, self.at(self.length))
     }

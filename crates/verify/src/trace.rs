@@ -17,7 +17,7 @@ use drawing::{Point, Rect, Vec2};
 use crate::{
     Place, Spread,
     histogram::Histogram,
-    target::{Piece, Target},
+    target::{PenTarget, Piece, Target},
 };
 
 /// Chords are merged into a run that stays within this share of the tolerance of each of them.
@@ -185,19 +185,18 @@ impl Trace {
         self.gather(target, bounds);
 
         let mut nearest = [(f64::INFINITY, 0_u32); 2];
-        // Least over the pieces of the larger distance at the run's ends.
-        let mut bound = f64::INFINITY;
+        // The distances of the run's ends from one piece: the one for which the larger is the least.
+        let mut common = [f64::INFINITY; 2];
         for &index in &self.near {
             let piece = &strokes.pieces[index as usize];
             let local = LocalRun::new(piece, &run);
-            let [from, to] = local.ends;
-            let distances = [piece.distance(from), piece.distance(to)];
+            let distances = local.ends.map(|end| piece.distance(end));
             for (best, distance) in nearest.iter_mut().zip(distances) {
                 if distance < best.0 {
                     *best = (distance, index);
                 }
             }
-            bound = bound.min(distances[0].max(distances[1]));
+            common = better(common, distances);
             if target.sparse_mm > 0.0 {
                 local.cover_middles(piece, self.radius, &mut self.covered);
             } else {
@@ -211,18 +210,25 @@ impl Trace {
         for (best, point) in nearest.iter_mut().zip([run.from, run.to]) {
             if best.0 > self.radius {
                 *best = strokes.nearest(point);
+                common = better(common, strokes.pieces[best.1 as usize].distances([run.from, run.to]));
             }
         }
 
         let length = distance(run.from, run.to);
         self.length += length;
         let ends = [(run.from, nearest[0].0), (run.to, nearest[1].0)];
-        let near = Near { pieces: &strokes.pieces, indices: &self.near, tight: TIGHT * self.tolerance };
+        let tight = TIGHT * self.tolerance;
+        let near = Near { strokes, indices: &self.near, radius: self.radius, tight };
         let distances = &mut self.distances;
         let mut largest = 0.0_f64;
-        near.bound(ends, bound, HALVINGS, &mut |value, length| {
-            distances.add(value + run.error, length);
-            largest = largest.max(value + run.error);
+        near.bound(ends, common, HALVINGS, &mut |[from, to], length| {
+            largest = largest.max(from.max(to) + run.error);
+            // Along the run the distance is at most what evenly leads from the one end's to the other's.
+            let steps = ((from - to).abs() / (0.1 * largest + 1e-12)).ceil().clamp(1.0, 8.0);
+            for step in 0..steps as usize {
+                let t = if to > from { step + 1 } else { step } as f64 / steps;
+                distances.add(from + t * (to - from) + run.error, length / steps);
+            }
         });
         if self.worst.is_none_or(|worst| largest > worst.mm) {
             let end = usize::from(nearest[1].0 > nearest[0].0);
@@ -473,39 +479,59 @@ fn keep(covered: &mut f32, square: f64, error: f64, radius: f64) {
 
 /// The pieces about a run.
 struct Near<'a> {
-    pieces: &'a [Piece],
+    strokes: &'a PenTarget,
+    /// All pieces within `radius` of the run, and some more.
     indices: &'a [u32],
+    radius: f64,
     tight: f64,
 }
 
 impl Near<'_> {
-    /// Hands on bounds of the distance of the run between two points whose own distances are known, with the lengths
-    /// they hold for. `bound` holds for the whole run.
-    fn bound(&self, ends: [(Point, f64); 2], bound: f64, halvings: u32, to: &mut impl FnMut(f64, f64)) {
+    /// Hands on bounds of the distance along the run between two points whose own distances are known: a bound at
+    /// either end, between which the distance stays below the even slope, and the length they hold for. `common`
+    /// are the distances of both points from one piece.
+    fn bound(
+        &self,
+        ends: [(Point, f64); 2],
+        common: [f64; 2],
+        halvings: u32,
+        to: &mut impl FnMut([f64; 2], f64),
+    ) {
         let [(from, at_from), (end, at_end)] = ends;
         let length = distance(from, end);
         // Distance changes by no more than one goes: it is largest on the way where it rises from both ends alike.
-        let bound = bound.min(0.5 * (at_from + at_end + length));
-        if bound <= at_from.max(at_end) + self.tight || halvings == 0 {
-            to(bound, length);
+        let rise = 0.5 * (at_from + at_end + length);
+        let common = better(common, [rise, rise]);
+        if common[0].max(common[1]) <= at_from.max(at_end) + self.tight || halvings == 0 {
+            to(common, length);
             return;
         }
         let middle = from.midpoint(end);
-        let mut at_middle = bound;
-        let mut bounds = [f64::INFINITY; 2];
-        for &index in self.indices {
-            let piece = &self.pieces[index as usize];
+        let mut at_middle = f64::INFINITY;
+        let mut halves = [[f64::INFINITY; 2]; 2];
+        let mut consider = |piece: &Piece| {
             let here = piece.distance(piece.local(middle));
             at_middle = at_middle.min(here);
-            for (bound, point) in bounds.iter_mut().zip([from, end]) {
-                if here < *bound {
-                    *bound = bound.min(here.max(piece.distance(piece.local(point))));
-                }
+            if here < halves[0][0].max(halves[0][1]) || here < halves[1][0].max(halves[1][1]) {
+                let [at_from, at_end] = piece.distances([from, end]);
+                halves = [better(halves[0], [at_from, here]), better(halves[1], [here, at_end])];
             }
+            here
+        };
+        let nearest = self.indices.iter().fold(f64::INFINITY, |nearest, &index| {
+            nearest.min(consider(&self.strokes.pieces[index as usize]))
+        });
+        if nearest > self.radius {
+            consider(&self.strokes.pieces[self.strokes.nearest(middle).1 as usize]);
         }
-        self.bound([ends[0], (middle, at_middle)], bounds[0], halvings - 1, to);
-        self.bound([(middle, at_middle), ends[1]], bounds[1], halvings - 1, to);
+        self.bound([ends[0], (middle, at_middle)], halves[0], halvings - 1, to);
+        self.bound([(middle, at_middle), ends[1]], halves[1], halvings - 1, to);
     }
+}
+
+/// The pair whose larger value is the smaller.
+fn better(known: [f64; 2], new: [f64; 2]) -> [f64; 2] {
+    if new[0].max(new[1]) < known[0].max(known[1]) { new } else { known }
 }
 
 fn distance(a: Point, b: Point) -> f64 {

@@ -1,0 +1,216 @@
+//! Machines made by hand, and a plotter that writes tick tables for them without any planner.
+
+#![allow(dead_code, unreachable_pub, reason = "each test uses its own part")]
+
+use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
+use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar, TwoLink};
+use plan::{Header, Limits, Row};
+use verify::{Certificate, Verifier};
+
+/// Time between rows, microseconds.
+pub const PERIOD_US: u64 = 10_000;
+
+fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
+    Motor { name: name.into(), counts, offset, max_speed, max_acceleration, max_jerk: None }
+}
+
+fn parts(name: &str, geometry: Geometry, motors: [Motor; 2], start: Joints) -> MachineParts {
+    MachineParts {
+        name: name.into(),
+        geometry,
+        joints: [Joint::FREE; 2],
+        min_dexterity: 0.0,
+        coupling: [[1.0, 0.0], [0.0, 1.0]],
+        motors,
+        pen: PenLift { max_speed: 100.0, lift_time: 0.15, drop_time: 0.2 },
+        sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
+        start,
+        period: 0.01,
+    }
+}
+
+/// x and y at 100 ticks/mm, 100 mm/s and 1000 mm/s²; joints from 0 to 200 mm; starts at (0, 0).
+pub fn cartesian() -> Machine {
+    let motors = [motor("x", 100.0, 0.0, 1e4, 1e5), motor("y", 100.0, 0.0, 1e4, 1e5)];
+    let mut parts = parts("cartesian", Geometry::Cartesian(Cartesian), motors, Joints::new(0.0, 0.0));
+    parts.joints = [Joint { min: 0.0, max: 200.0 }; 2];
+    Machine::new(parts).expect("a sound machine")
+}
+
+/// Seed 1's arm: both motors on the base, 3200 ticks a turn, stretched upwards at the start.
+pub fn arm() -> Machine {
+    let counts = 3200.0 / std::f64::consts::TAU;
+    let up = std::f64::consts::FRAC_PI_2;
+    let motors = [motor("arm1", counts, 0.0, 533.3, 2666.7), motor("arm2", -counts, 800.0, 533.3, 2666.7)];
+    let arm = TwoLink { l1: 206.0, l2: 256.0, elbow_left: true };
+    Machine::new(parts("arm", Geometry::TwoLink(arm), motors, Joints::new(up, up))).expect("a sound machine")
+}
+
+/// Angle and radius, the angle in steps of 1/2000 rad.
+pub fn polar() -> Machine {
+    let motors = [motor("phi", 2000.0, 0.0, 4e3, 4e4), motor("r", 100.0, 0.0, 1e4, 1e5)];
+    Machine::new(parts("polar", Geometry::Polar(Polar), motors, Joints::new(0.5, 60.0)))
+        .expect("a sound machine")
+}
+
+pub fn header(machine: &Machine) -> Header {
+    Header {
+        machine: machine.name().into(),
+        motors: machine.motors().clone().map(|motor| plan::Motor {
+            name: motor.name,
+            limits: Limits { speed: motor.max_speed, acceleration: motor.max_acceleration, jerk: None },
+        }),
+        placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        period_us: PERIOD_US,
+        rows: 0,
+        duration_us: 0,
+    }
+}
+
+/// A drawing of polylines, one source byte a stroke.
+pub fn drawing(strokes: &[(u16, &[(f64, f64)])]) -> Drawing {
+    let strokes = strokes.iter().enumerate().filter_map(|(index, (pen, points))| {
+        let points = points.iter().map(|(x, y)| Point::new(*x, *y)).collect();
+        Stroke::polyline(Pen(*pen), points, Span { start: index, end: index + 1 })
+    });
+    Drawing { strokes: strokes.collect() }
+}
+
+/// Writes rows: straight lines of the pen, each from rest to rest by `s = 3 u² - 2 u³`.
+#[derive(Clone)]
+pub struct Plotter<'a> {
+    pub machine: &'a Machine,
+    pub rows: Vec<Row>,
+    pub exact: Vec<[f64; 2]>,
+    pub period_us: u64,
+    /// Speed of the motors as a share of their limits.
+    pub haste: f64,
+    joints: Joints,
+}
+
+impl<'a> Plotter<'a> {
+    pub fn new(machine: &'a Machine) -> Self {
+        let mut plotter = Self {
+            machine,
+            rows: Vec::new(),
+            exact: Vec::new(),
+            period_us: PERIOD_US,
+            haste: 0.95,
+            joints: machine.start(),
+        };
+        plotter.push(0, 0);
+        plotter
+    }
+
+    fn push(&mut self, t_us: u64, pen: u16) {
+        let exact = self.machine.ticks(&self.joints);
+        let ticks = [exact.x.round() as i64, exact.y.round() as i64];
+        self.rows.push(Row { t_us, pen, ticks });
+        self.exact.push([exact.x, exact.y]);
+    }
+
+    fn last(&self) -> Row {
+        self.rows[self.rows.len() - 1]
+    }
+
+    pub fn rest(&mut self, seconds: f64) -> &mut Self {
+        let Row { t_us, pen, .. } = self.last();
+        self.push(t_us + (seconds * 1e6).round() as u64, pen);
+        self
+    }
+
+    /// Puts the pen down or lifts it, and waits.
+    pub fn pen(&mut self, pen: u16) -> &mut Self {
+        let last = self.rows.len() - 1;
+        // The first row belongs to the pen being up.
+        if last == 0 {
+            self.rest(self.period_us as f64 * 1e-6);
+        }
+        let last = self.rows.len() - 1;
+        self.rows[last].pen = pen;
+        let PenLift { lift_time, drop_time, .. } = *self.machine.pen();
+        self.rest(if pen == 0 { lift_time } else { drop_time })
+    }
+
+    /// Poses along a path, `u` from 0 to 1, as fast as the motors allow.
+    fn follow(&mut self, path: impl Fn(f64) -> Joints) -> &mut Self {
+        let ticks = |u: f64| self.machine.ticks(&path(u * u * (3.0 - 2.0 * u)));
+        let dt = self.period_us as f64 * 1e-6;
+        let too_fast = |steps: usize| {
+            let at = |k: usize| ticks((k as f64 / steps as f64).min(1.0));
+            (0..steps).any(|k| {
+                // Before the first step the pen may have come from where it goes.
+                let (a, b, c) = (at(k.abs_diff(1)), at(k), at(k + 1));
+                (0..2).any(|m| {
+                    let motor = &self.machine.motors()[m];
+                    (c[m] - b[m]).abs() > self.haste * motor.max_speed * dt
+                        || (c[m] - 2.0 * b[m] + a[m]).abs() > self.haste * motor.max_acceleration * dt * dt
+                })
+            })
+        };
+        let mut steps = 1;
+        while too_fast(steps) {
+            steps += 1 + steps / 64;
+        }
+        let Row { t_us, pen, .. } = self.last();
+        let poses: Vec<Joints> = (1..=steps)
+            .map(|k| {
+                let u = k as f64 / steps as f64;
+                path(u * u * (3.0 - 2.0 * u))
+            })
+            .collect();
+        for (k, pose) in poses.into_iter().enumerate() {
+            self.joints = pose;
+            self.push(t_us + (k as u64 + 1) * self.period_us, pen);
+        }
+        self
+    }
+
+    /// Straight on paper.
+    pub fn line(&mut self, x: f64, y: f64) -> &mut Self {
+        let from = self.machine.geometry().forward(&self.joints);
+        let (machine, near, to) = (self.machine, self.joints, Point::new(x, y));
+        self.follow(|u| machine.pose_near(from.lerp(to, u), &near).expect("a point within reach"))
+    }
+
+    /// Straight in the joints.
+    pub fn travel(&mut self, x: f64, y: f64) -> &mut Self {
+        let to = self.machine.pose_near(Point::new(x, y), &self.joints).expect("a point within reach");
+        self.travel_to(to)
+    }
+
+    pub fn travel_to(&mut self, to: Joints) -> &mut Self {
+        let from = self.joints;
+        self.follow(|u| from + (to - from) * u)
+    }
+
+    pub fn stroke(&mut self, pen: u16, points: &[(f64, f64)]) -> &mut Self {
+        self.travel(points[0].0, points[0].1).pen(pen);
+        for (x, y) in &points[1..] {
+            self.line(*x, *y);
+        }
+        self.pen(0)
+    }
+
+    pub fn park(&mut self) -> &mut Self {
+        self.travel_to(self.machine.start())
+    }
+
+    pub fn verify(&self, drawing: &Drawing, tolerance: f64) -> Certificate {
+        self.verify_as(drawing, tolerance, true)
+    }
+
+    pub fn verify_as(&self, drawing: &Drawing, tolerance: f64, exact: bool) -> Certificate {
+        let header = Header { period_us: self.period_us, ..header(self.machine) };
+        let mut verifier = Verifier::new(self.machine, drawing, &header, tolerance);
+        for (index, row) in self.rows.iter().enumerate() {
+            verifier.row(*row, exact.then(|| self.exact[index]));
+        }
+        verifier.finish()
+    }
+}
+
+/// One line a failure.
+pub fn sentences(certificate: &Certificate) -> Vec<String> {
+    certificate.failures.iter().map(ToString::to_string).collect()
+}

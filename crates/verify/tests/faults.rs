@@ -1,0 +1,466 @@
+//! A good plan holds; each single fault makes exactly the failure it should.
+
+mod common;
+
+use common::{Plotter, arm, cartesian, drawing, polar, sentences};
+use drawing::Drawing;
+use kinematics::{Joint, Machine};
+use verify::{Certificate, PenMotion, Violation};
+
+const SQUARE: &[(f64, f64)] = &[(20.0, 20.0), (60.0, 20.0), (60.0, 50.0), (20.0, 50.0), (20.0, 20.0)];
+const SLANT: &[(f64, f64)] = &[(80.0, 30.0), (97.3, 71.9)];
+const DOT: &[(f64, f64)] = &[(30.0, 35.0)];
+const TOLERANCE: f64 = 0.1;
+
+fn picture() -> Drawing {
+    drawing(&[(1, SQUARE), (2, SLANT), (1, DOT)])
+}
+
+fn good(machine: &Machine) -> Plotter<'_> {
+    let mut plotter = Plotter::new(machine);
+    plotter.stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT).park();
+    plotter
+}
+
+/// The only failure, and its sentence.
+fn only(certificate: &Certificate) -> (&Violation, String) {
+    assert!(!certificate.holds);
+    assert_eq!(certificate.failures.len(), 1, "{:#?}", sentences(certificate));
+    (&certificate.failures[0].violation, certificate.failures[0].to_string())
+}
+
+fn row_where(plotter: &Plotter, holds: impl Fn(usize) -> bool) -> usize {
+    (1..plotter.rows.len() - 1).find(|row| holds(*row)).expect("such a row")
+}
+
+/// A row in full motion with that pen, with rows of the same pen around it.
+fn moving(plotter: &Plotter, pen: u16) -> usize {
+    row_where(plotter, |row| {
+        (row - 1..=row + 8).all(|k| plotter.rows[k].pen == pen)
+            && plotter.rows[row].ticks != plotter.rows[row + 1].ticks
+            && plotter.rows[row].ticks != plotter.rows[row - 1].ticks
+    })
+}
+
+#[test]
+fn a_good_plan_holds_on_a_cartesian_machine() {
+    let machine = cartesian();
+    let certificate = good(&machine).verify(&picture(), TOLERANCE);
+    assert!(certificate.holds, "{:#?}", sentences(&certificate));
+    let before = certificate.before_rounding.expect("exact positions were given");
+    assert!(before.max_mm() < 0.0005, "{before:?}");
+    assert!(certificate.after_rounding.max_mm() < 0.008, "{:?}", certificate.after_rounding);
+    assert_eq!(certificate.pens, [1, 2]);
+    assert_eq!((certificate.pen_downs, certificate.dots), (3, 1));
+    let ink: f64 = picture().length();
+    assert!((certificate.ink_mm - ink).abs() < 1e-3, "{} instead of {ink}", certificate.ink_mm);
+    assert!((certificate.tick_floor.worst_mm - 0.005 * 2.0_f64.sqrt()).abs() < 1e-12);
+    assert!((certificate.tick_floor.rms_mm - 0.01 / 6.0_f64.sqrt()).abs() < 1e-12);
+    assert!(certificate.largest_rounding.expect("exact positions") <= 0.5);
+    for motor in &certificate.motors {
+        assert!(motor.speed_share <= 1.0 && motor.acceleration_share <= 1.0, "{motor:?}");
+        assert!(motor.acceleration_share > 0.5 && motor.acceleration_share_p999 > 0.5, "{motor:?}");
+        assert!(motor.speed_share_p999 <= motor.speed_share, "{motor:?}");
+    }
+}
+
+#[test]
+fn a_good_plan_holds_without_exact_positions() {
+    let machine = cartesian();
+    let certificate = good(&machine).verify_as(&picture(), TOLERANCE, false);
+    assert!(certificate.holds, "{:#?}", sentences(&certificate));
+    assert!(certificate.before_rounding.is_none() && certificate.largest_rounding.is_none());
+}
+
+#[test]
+fn good_plans_hold_on_an_arm_and_a_polar_machine() {
+    let shifted = |by: (f64, f64)| {
+        let mut placed = picture();
+        placed.transform(drawing::Affine::translate(by));
+        placed
+    };
+    let shift = |points: &[(f64, f64)], by: (f64, f64)| -> Vec<(f64, f64)> {
+        points.iter().map(|(x, y)| (x + by.0, y + by.1)).collect()
+    };
+    for (machine, by) in [(arm(), (30.0, 200.0)), (polar(), (10.0, 10.0))] {
+        let mut plotter = Plotter::new(&machine);
+        for (pen, points) in [(1, SQUARE), (2, SLANT), (1, DOT)] {
+            plotter.stroke(pen, &shift(points, by));
+        }
+        let certificate = plotter.park().verify(&shifted(by), TOLERANCE);
+        assert!(certificate.holds, "{:#?}", sentences(&certificate));
+        let before = certificate.before_rounding.expect("exact positions were given");
+        // Rows some millimetres apart in the joints: the pen bows, and the replay sees it.
+        assert!(before.max_mm() > 0.001, "{before:?}");
+    }
+}
+
+#[test]
+fn a_missed_segment() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, &SQUARE[..4]).stroke(2, SLANT).stroke(1, DOT).park();
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    let Violation::Missed { pen: 1, rounded: true, more: true, missed_mm, strokes: 1, .. } = violation else {
+        panic!("{sentence}")
+    };
+    assert!((missed_mm - 30.0).abs() < 0.5, "{sentence}");
+    assert_eq!(certificate.failures[0].place.stroke, Some(0));
+    assert!(certificate.after_rounding.drawing_to_ink.more);
+}
+
+#[test]
+fn a_missed_dot() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, SQUARE).stroke(2, SLANT).park();
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    assert!(matches!(violation, Violation::Missed { pen: 1, more: true, missed_mm: 0.0, .. }), "{sentence}");
+    let place = certificate.failures[0].place;
+    assert_eq!((place.stroke, place.source.map(|span| span.start)), (Some(2), Some(2)));
+}
+
+#[test]
+fn a_dot_too_many() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT).stroke(2, &[(50.0, 40.0)]).park();
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    assert!(matches!(violation, Violation::Strays { pen: 2, .. }), "{sentence}");
+}
+
+#[test]
+fn a_stray_of_three_tenths() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, SQUARE).stroke(2, SLANT);
+    // A whisker aside from the long edge and back: nothing is missed for it.
+    plotter
+        .travel(20.0, 20.0)
+        .pen(1)
+        .line(30.0, 20.0)
+        .line(30.0, 20.3)
+        .line(30.0, 20.0)
+        .pen(0)
+        .stroke(1, DOT)
+        .park();
+    let certificate = plotter.verify(&picture(), TOLERANCE);
+    assert!(
+        certificate.failures.iter().all(|f| matches!(f.violation, Violation::Strays { pen: 1, .. })),
+        "{:#?}",
+        sentences(&certificate)
+    );
+    assert_eq!(certificate.failures.len(), 2, "before and after rounding: {:#?}", sentences(&certificate));
+    let before = certificate.before_rounding.expect("exact positions");
+    assert!((before.ink_to_drawing.max_mm - 0.3).abs() < 0.001, "{before:?}");
+    assert!(before.drawing_to_ink.max_mm < 0.001, "{before:?}");
+    assert!(before.ink_to_drawing.p99_mm < 0.01, "{before:?}");
+    let point = certificate.failures[0].place.point_mm.expect("a point");
+    assert!((point.x - 30.0).abs() < 1e-6 && (point.y - 20.3).abs() < 1e-6, "{point:?}");
+}
+
+#[test]
+fn a_stray_far_away_is_measured() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    plotter.stroke(1, &[(150.0, 35.0), (160.0, 35.0)]).park();
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    let Violation::Strays { distance_mm, .. } = violation else { panic!("{sentence}") };
+    assert!((distance_mm - 100.0).abs() < 0.01, "{sentence}");
+}
+
+#[test]
+fn too_fast_by_five_percent() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT).park();
+    let mut header = common::header(&machine);
+    let peak = |certificate: &Certificate| certificate.motors[0].speed;
+    let fastest = peak(&plotter.verify(&picture(), TOLERANCE));
+    header.motors[0].limits.speed = (fastest - 1.0 / 0.01) / 1.05;
+    let mut verifier = verify::Verifier::new(&machine, &picture(), &header, TOLERANCE);
+    plotter.rows.iter().for_each(|row| verifier.row(*row, None));
+    let certificate = verifier.finish();
+    let (violation, sentence) = only(&certificate);
+    assert!(matches!(violation, Violation::Speed { motor, .. } if motor == "x"), "{sentence}");
+    assert!(violation.is_limit());
+    // Just at the limit it holds: the allowance is one tick a period.
+    header.motors[0].limits.speed = fastest - 1.0 / 0.01;
+    let mut verifier = verify::Verifier::new(&machine, &picture(), &header, TOLERANCE);
+    plotter.rows.iter().for_each(|row| verifier.row(*row, None));
+    assert!(verifier.finish().holds);
+}
+
+#[test]
+fn too_hard_an_acceleration() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    // 13 ticks aside in one row: 100 ticks/s of speed is nothing, but 2 * 13 ticks in T² are three limits of 10 ticks.
+    let row = row_where(&plotter, |row| {
+        row > 12
+            && (row - 1..=row + 8).all(|k| plotter.rows[k].pen == 0)
+            && plotter.rows[row].ticks[0] != plotter.rows[row + 1].ticks[0]
+            && plotter.rows[row].ticks[0] != plotter.rows[row - 1].ticks[0]
+            && (plotter.rows[row].ticks[0] - plotter.rows[row - 1].ticks[0]).abs() < 50
+    });
+    plotter.rows[row].ticks[0] += 13;
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    assert!(matches!(violation, Violation::Acceleration { motor, .. } if motor == "x"), "{sentence}");
+    assert_eq!(certificate.failures[0].place.row, Some(row as u64));
+}
+
+#[test]
+fn time_stands_still_or_goes_back() {
+    let machine = cartesian();
+    for back in [0, 1] {
+        let mut plotter = good(&machine);
+        let row = moving(&plotter, 1);
+        let mut again = plotter.rows[row];
+        again.t_us -= back;
+        plotter.rows.insert(row + 1, again);
+        let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+        let (violation, sentence) = only(&certificate);
+        assert!(matches!(violation, Violation::Time { .. }), "{sentence}");
+        assert_eq!(certificate.failures[0].place.row, Some(row as u64 + 1));
+    }
+}
+
+#[test]
+fn time_begins_late() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    plotter.rows.iter_mut().for_each(|row| row.t_us += 5);
+    let (certificate, expected) =
+        (plotter.verify_as(&picture(), TOLERANCE, false), Violation::TimeStart { t_us: 5 });
+    assert_eq!(only(&certificate).0, &expected);
+}
+
+#[test]
+fn the_pen_goes_down_while_moving() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    // The pen is lowered one row later than it should be, and has one period less.
+    let down = row_where(&plotter, |row| plotter.rows[row].pen == 1);
+    let mut late = plotter.rows[down];
+    plotter.rows[down].pen = 0;
+    late.t_us += 10_000;
+    plotter.rows.insert(down + 1, late);
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    assert_eq!(
+        violation,
+        &Violation::MovesDuringPen { motion: PenMotion::Drop, pen: 1, early_us: 10_000 },
+        "{sentence}"
+    );
+}
+
+#[test]
+fn the_pen_is_lifted_late() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    let up = row_where(&plotter, |row| plotter.rows[row - 1].pen == 1 && plotter.rows[row].pen == 0);
+    let mut late = plotter.rows[up];
+    plotter.rows[up].pen = 1;
+    late.t_us += 1;
+    plotter.rows.insert(up + 1, late);
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let (violation, sentence) = only(&certificate);
+    assert_eq!(
+        violation,
+        &Violation::MovesDuringPen { motion: PenMotion::Lift, pen: 1, early_us: 1 },
+        "{sentence}"
+    );
+}
+
+#[test]
+fn the_wrong_pen() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, SQUARE).stroke(3, SLANT).stroke(1, DOT).park();
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let violations: Vec<_> = certificate.failures.iter().map(|failure| &failure.violation).collect();
+    assert!(
+        matches!(violations[..], [Violation::ForeignPen { pen: 3 }, Violation::Missed { pen: 2, .. }]),
+        "{violations:#?}"
+    );
+    assert_eq!(certificate.pens, [1, 3]);
+}
+
+#[test]
+fn an_exchange_of_pens_needs_time_for_lift_and_drop() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    let picture = drawing(&[(1, &[(10.0, 10.0), (20.0, 10.0)]), (2, &[(20.0, 10.0), (20.0, 20.0)])]);
+    plotter.travel(10.0, 10.0).pen(1).line(20.0, 10.0).pen(2);
+    let mut patient = plotter.clone();
+    plotter.line(20.0, 20.0).pen(0).park();
+    let certificate = plotter.verify_as(&picture, TOLERANCE, false);
+    assert_eq!(
+        only(&certificate).0,
+        &Violation::MovesDuringPen { motion: PenMotion::Change, pen: 2, early_us: 150_000 }
+    );
+    patient.rest(0.15).line(20.0, 20.0).pen(0).park();
+    assert!(patient.verify(&picture, TOLERANCE).holds);
+}
+
+#[test]
+fn the_wrong_start_pose() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    plotter.rows[0].ticks = [1, 0];
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let expected = Violation::StartPose { found: [1, 0], expected: [0, 0] };
+    assert_eq!(only(&certificate).0, &expected);
+}
+
+#[test]
+fn parked_elsewhere() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT);
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let expected = Violation::ParkPose { found: [3000, 3500], expected: [0, 0] };
+    assert_eq!(only(&certificate).0, &expected);
+    let mut verifier = verify::Verifier::new(&machine, &picture(), &common::header(&machine), TOLERANCE);
+    verifier.allow_park([3000, 3500]);
+    plotter.rows.iter().for_each(|row| verifier.row(*row, None));
+    assert!(verifier.finish().holds);
+}
+
+#[test]
+fn not_from_rest() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.travel(25.0, 0.0).stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT).park();
+    // The gentle first rows are cut out: the plan begins at full speed.
+    let fast = row_where(&plotter, |row| plotter.rows[row].ticks[0] >= 600);
+    let (cut, at) = (plotter.rows[fast].t_us - 10_000, plotter.rows[fast].ticks[0]);
+    plotter.rows.drain(1..fast);
+    plotter.rows[1..].iter_mut().for_each(|row| row.t_us -= cut);
+    plotter.rows[0].ticks = [at - (plotter.rows[2].ticks[0] - at), 0];
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    let violations: Vec<_> = certificate.failures.iter().map(|failure| &failure.violation).collect();
+    assert!(
+        matches!(violations[..], [Violation::StartPose { .. }, Violation::RestAtStart { .. }]),
+        "{violations:#?}"
+    );
+}
+
+#[test]
+fn cut_off_in_motion() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    let rows = plotter.rows.len() - 12;
+    plotter.rows.truncate(rows);
+    let mut verifier = verify::Verifier::new(&machine, &picture(), &common::header(&machine), TOLERANCE);
+    verifier.allow_park(plotter.rows[rows - 1].ticks);
+    plotter.rows.iter().for_each(|row| verifier.row(*row, None));
+    let certificate = verifier.finish();
+    assert!(!certificate.holds);
+    assert!(
+        certificate.failures.iter().all(|f| matches!(f.violation, Violation::RestAtEnd { .. })),
+        "{:#?}",
+        sentences(&certificate)
+    );
+}
+
+#[test]
+fn the_pen_down_at_either_end() {
+    let machine = cartesian();
+    let dot = drawing(&[(1, &[(0.0, 0.0)])]);
+    let mut plotter = Plotter::new(&machine);
+    plotter.rows[0].pen = 1;
+    plotter.rest(0.2);
+    let certificate = plotter.verify(&dot, TOLERANCE);
+    let violations: Vec<_> = certificate.failures.iter().map(|failure| &failure.violation).collect();
+    assert_eq!(violations, [&Violation::PenAtStart { pen: 1 }, &Violation::PenAtEnd { pen: 1 }]);
+}
+
+#[test]
+fn beyond_a_joint() {
+    let mut parts = cartesian().parts().clone();
+    parts.joints[0] = Joint { min: 0.0, max: 97.0 };
+    let machine = Machine::new(parts).expect("a sound machine");
+    let free = cartesian();
+    let plotter = good(&free);
+    let mut verifier = verify::Verifier::new(&machine, &picture(), &common::header(&machine), TOLERANCE);
+    plotter.rows.iter().for_each(|row| verifier.row(*row, None));
+    let certificate = verifier.finish();
+    let (violation, sentence) = only(&certificate);
+    assert!(matches!(violation, Violation::Joint { .. }), "{sentence}");
+    assert!(certificate.failures[0].count > 1, "{sentence}");
+}
+
+#[test]
+fn half_a_tick_beyond_a_joint_is_rounding() {
+    let mut parts = cartesian().parts().clone();
+    parts.joints[0] = Joint { min: 0.0, max: 97.2956 };
+    let machine = Machine::new(parts).expect("a sound machine");
+    let picture = drawing(&[(1, &[(80.0, 30.0), (97.2956, 71.9)])]);
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, &[(80.0, 30.0), (97.2956, 71.9)]).park();
+    assert!(plotter.rows.iter().any(|row| row.ticks[0] == 9730));
+    let certificate = plotter.verify(&picture, TOLERANCE);
+    assert!(certificate.holds, "{:#?}", sentences(&certificate));
+}
+
+#[test]
+fn rounding_that_drifts() {
+    let machine = cartesian();
+    let mut plotter = good(&machine);
+    let row = moving(&plotter, 1);
+    plotter.rows[row].ticks[0] += 1;
+    let certificate = plotter.verify(&picture(), TOLERANCE);
+    let (violation, sentence) = only(&certificate);
+    assert!(matches!(violation, Violation::Drift { motor, .. } if motor == "x"), "{sentence}");
+}
+
+#[test]
+fn nothing_at_all() {
+    let machine = cartesian();
+    let verifier = verify::Verifier::new(&machine, &Drawing::default(), &common::header(&machine), TOLERANCE);
+    let certificate = verifier.finish();
+    assert_eq!(only(&certificate).0, &Violation::Empty);
+    // A plan that only stands draws the empty drawing.
+    let certificate = Plotter::new(&machine).rest(1.0).verify(&Drawing::default(), TOLERANCE);
+    assert!(certificate.holds, "{:#?}", sentences(&certificate));
+}
+
+#[test]
+fn numbers_that_are_none() {
+    let machine = cartesian();
+    let broken = drawing(&[(1, &[(f64::NAN, 0.0), (1.0, 1.0)])]);
+    let certificate = Plotter::new(&machine).rest(1.0).verify(&broken, TOLERANCE);
+    assert_eq!(only(&certificate).0, &Violation::NotFinite);
+    for tolerance in [f64::NAN, -1.0] {
+        assert!(!good(&machine).verify(&picture(), tolerance).holds, "{tolerance}");
+    }
+    let mut plotter = good(&machine);
+    let row = moving(&plotter, 1);
+    plotter.rows[row].ticks = [i64::MAX, i64::MIN];
+    assert!(!plotter.verify(&picture(), TOLERANCE).holds);
+}
+
+#[test]
+fn sentences_read_well() {
+    let machine = cartesian();
+    let mut plotter = Plotter::new(&machine);
+    plotter.stroke(1, &SQUARE[..4]).stroke(1, DOT).stroke(4, SLANT);
+    let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
+    assert_eq!(
+        sentences(&certificate),
+        [
+            "pen 4 draws, and the drawing has no stroke of it, at 3.910000 s, row 325, at 80.00, 30.00 mm",
+            "the plan ends at 9730, 7190 ticks instead of parking at 0, 0, at 4.940000 s, row 395, at 97.30, 71.90 mm",
+            "29.80 mm of pen 1 in 1 stroke are missed, by more than 0.4141 mm after rounding to ticks where \
+             0.1071 mm are allowed, at 20.00, 49.59 mm, stroke 0 (bytes 0 to 1)",
+            "45.33 mm of pen 2 in 1 stroke are missed, by more than 0.4141 mm after rounding to ticks where \
+             0.1071 mm are allowed, at 80.00, 30.01 mm, stroke 1 (bytes 1 to 2)",
+        ]
+    );
+}
