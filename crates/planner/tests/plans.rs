@@ -12,6 +12,10 @@ fn machine() -> impl Strategy<Value = Machine> {
     prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())]
 }
 
+fn polyline(points: Vec<Point>) -> Stroke {
+    Stroke::polyline(Pen(1), points, Span::default()).expect("there are points")
+}
+
 /// Strokes inside the unit square: polylines, circles and ellipses, cubics, dots.
 fn stroke() -> impl Strategy<Value = Stroke> {
     let point = || (0.0..1.0f64, 0.0..1.0f64).prop_map(|(x, y)| Point::new(x, y));
@@ -27,16 +31,11 @@ fn stroke() -> impl Strategy<Value = Stroke> {
                 );
                 points.push(at);
             }
-            Stroke::polyline(Pen(1), points, Span::default()).expect("points")
+            polyline(points)
         },
     );
     prop_oneof![
-        proptest::collection::vec(point(), 1..8).prop_map(|points| Stroke::polyline(
-            Pen(1),
-            points,
-            Span::default()
-        )
-        .unwrap()),
+        proptest::collection::vec(point(), 1..8).prop_map(polyline),
         fine,
         (point(), 0.001..0.3f64, -7.0..7.0f64, -6.2..6.2f64).prop_map(|(c, r, start, sweep)| {
             let c = Point::new(c.x.clamp(r, 1.0 - r), c.y.clamp(r, 1.0 - r));

@@ -4,7 +4,7 @@ use drawing::Rect;
 use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar, TwoLink};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-pub fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
+pub(crate) fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
     Motor { name: name.into(), counts, offset, max_speed, max_acceleration, max_jerk: None }
 }
 
@@ -31,7 +31,7 @@ fn build(
     .expect("the parts make a machine")
 }
 
-pub fn arm() -> Machine {
+pub(crate) fn arm() -> Machine {
     let counts = 3200.0 / TAU;
     build(
         Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
@@ -43,7 +43,7 @@ pub fn arm() -> Machine {
     )
 }
 
-pub fn corexy() -> Machine {
+pub(crate) fn corexy() -> Machine {
     build(
         Geometry::Cartesian(Cartesian),
         [Joint { min: 0.0, max: 200.0 }, Joint { min: 0.0, max: 200.0 }],
@@ -54,7 +54,7 @@ pub fn corexy() -> Machine {
     )
 }
 
-pub fn polar() -> Machine {
+pub(crate) fn polar() -> Machine {
     build(
         Geometry::Polar(Polar),
         [Joint { min: 0.0, max: PI }, Joint { min: 48.0, max: 138.0 }],

@@ -1,0 +1,227 @@
+//! What can be said on the command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
+use plotplan::{pipeline, quantity};
+
+/// Compiles pen-plotter drawings (HPGL, HP-GL/2) to motor motion.
+///
+/// `plotplan convert drawing.hpgl --machine coaxial` writes the plan to standard output: a table of motor ticks against
+/// time, certified to draw the drawing within a tolerance and inside the motors' limits.
+#[derive(Debug, Parser)]
+#[command(name = "plotplan", version, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Turn a drawing into a plan for a machine, or into a clean drawing
+    Convert(Convert),
+    /// Say what a drawing's file says, and what would not plot
+    Check(Check),
+    /// Lengths, pens, bounds, duration of a drawing or a plan
+    Info(Info),
+    /// Recompute a plan's certificate
+    Verify(Verify),
+    /// Draw a picture of a drawing or a plan on its machine
+    Preview(Preview),
+    /// List, show and check machines
+    #[command(subcommand)]
+    Machine(Machine),
+    /// Explain a diagnostic's code
+    Explain(Explain),
+    /// Print a completion script for a shell
+    Completions(Completions),
+    /// Print the manual page
+    Man,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Convert {
+    /// Drawing to read; `-` for standard input
+    pub(crate) file: String,
+    /// Machine: a preset's name (see `plotplan machine list`) or a machine file
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    /// Where to write; `-` for standard output
+    #[arg(short, long, value_name = "OUT", default_value = "-")]
+    pub(crate) output: String,
+    /// What to write; `hpgl` and `svg` are the drawing as understood and need no machine
+    #[arg(short, long, value_enum, default_value_t = Format::Ticks)]
+    pub(crate) format: Format,
+    #[command(flatten)]
+    pub(crate) planning: Planning,
+    /// Take warnings for errors
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// How to report on standard error
+    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
+    pub(crate) report: ReportForm,
+}
+
+/// How a plan is made.
+#[derive(Debug, Args)]
+pub(crate) struct Planning {
+    /// Largest distance between drawing and pen, before rounding to ticks
+    #[arg(long, value_name = "LENGTH", default_value = "0.1mm", value_parser = length)]
+    pub(crate) tolerance: f64,
+    /// Time between rows; the machine's own if not given
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub(crate) period: Option<f64>,
+    /// In which order to draw the strokes
+    #[arg(long, value_enum, default_value_t = Order::Optimize)]
+    pub(crate) order: Order,
+    /// Scale and move the drawing to the largest size that sheet and machine allow
+    #[arg(long, conflicts_with_all = ["place", "scale"])]
+    pub(crate) fit: bool,
+    /// Put the drawing's origin so far from the sheet's lower-left corner
+    #[arg(long, value_name = "X,Y", value_parser = place, allow_hyphen_values = true)]
+    pub(crate) place: Option<(f64, f64)>,
+    /// Scale the drawing about its origin
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) scale: Option<f64>,
+    /// Turn the drawing counterclockwise, its lower-left corner staying in place
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub(crate) rotate: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Check {
+    /// Drawing to read; `-` for standard input
+    pub(crate) file: String,
+    /// Also check whether this machine can draw it
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    #[command(flatten)]
+    pub(crate) planning: Planning,
+    /// Take warnings for errors
+    #[arg(long)]
+    pub(crate) strict: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Info {
+    /// Drawing or plan to read; `-` for standard input
+    pub(crate) file: String,
+    /// For a drawing: also plan it for this machine. For a plan of a machine that is no preset: its file
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    #[command(flatten)]
+    pub(crate) planning: Planning,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Verify {
+    /// Plan to verify; `-` for standard input
+    pub(crate) plan: String,
+    /// The drawing it should draw; without it only motion is verified
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) drawing: Option<String>,
+    /// The machine, where the plan only knows its name and it is no preset
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    /// Largest distance between drawing and pen that the plan was made for; a plan document knows its own
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub(crate) tolerance: Option<f64>,
+    /// How to report
+    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
+    pub(crate) report: ReportForm,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Preview {
+    /// Drawing or plan to read; `-` for standard input
+    pub(crate) file: String,
+    /// Picture to write: NAME.svg or NAME.png
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: String,
+    /// The machine to show it on; a plan knows its own
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    #[command(flatten)]
+    pub(crate) planning: Planning,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Machine {
+    /// List the machines that come with plotplan
+    List,
+    /// Print a machine as a file that can be changed and given to --machine
+    Show {
+        /// Name of a preset, or a machine file
+        name: String,
+    },
+    /// Check a machine file: does it hold together, and does it reach its sheet
+    Check {
+        /// Machine file, or the name of a preset
+        file: String,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Explain {
+    /// The code, such as H0101
+    pub(crate) code: String,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub(crate) shell: Shell,
+}
+
+/// What convert writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// Tick lines, for any serial sender
+    Ticks,
+    /// A table of ticks against time
+    Csv,
+    /// A plan document with machine, settings and certificate
+    Json,
+    /// The drawing as understood, as clean HP-GL
+    Hpgl,
+    /// The drawing as understood, as SVG in mm
+    Svg,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ReportForm {
+    /// For people
+    Text,
+    /// One JSON object on the last line
+    Json,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Order {
+    /// The least time with the pen up
+    Optimize,
+    /// As in the file
+    File,
+}
+
+impl From<Order> for pipeline::Order {
+    fn from(order: Order) -> Self {
+        match order {
+            Order::Optimize => Self::Optimize,
+            Order::File => Self::File,
+        }
+    }
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    quantity::length_mm(text, true).map_err(|error| error.to_string())
+}
+
+fn time(text: &str) -> Result<f64, String> {
+    quantity::time_s(text).map_err(|error| error.to_string())
+}
+
+fn place(text: &str) -> Result<(f64, f64), String> {
+    let (x, y) = text.split_once(',').ok_or("a place is two lengths with a comma between, such as 10mm,2cm")?;
+    Ok((length(x)?, length(y)?))
+}

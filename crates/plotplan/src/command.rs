@@ -1,0 +1,59 @@
+//! The commands, one file each.
+
+mod check;
+mod convert;
+mod info;
+mod machine;
+mod preview;
+mod verify;
+
+use clap::CommandFactory as _;
+use kinematics::Machine;
+use plotplan::pipeline::Request;
+use planner::placement::{Size, Wish};
+
+use crate::cli::{Arguments, Command, Planning};
+use crate::failure::Failure;
+use crate::output;
+
+/// Does what the command line asks for.
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.command {
+        Command::Convert(convert) => convert::run(convert),
+        Command::Check(check) => check::run(check),
+        Command::Info(info) => info::run(info),
+        Command::Verify(verify) => verify::run(verify),
+        Command::Preview(preview) => preview::run(preview),
+        Command::Machine(machine) => machine::run(machine),
+        Command::Explain(explain) => {
+            let Some(code) = hpgl::Code::from_name(&explain.code) else {
+                let what = format!("there is no code {}; codes stand in brackets in diagnostics", explain.code);
+                return Err(Failure::Usage(anyhow::anyhow!(what)));
+            };
+            let text = format!("{code}: {} ({})\n\n{}\n", code.title(), code.severity(), code.explanation());
+            output::write("-", |out| out.write_all(text.as_bytes()))
+        }
+        Command::Completions(completions) => output::write("-", |out| {
+            clap_complete::generate(completions.shell, &mut Arguments::command(), "plotplan", &mut &mut *out);
+            Ok(())
+        }),
+        Command::Man => output::write("-", |out| clap_mangen::Man::new(Arguments::command()).render(out)),
+    }
+}
+
+/// The request that the command line's words make, on this machine.
+fn request(planning: &Planning, machine: &Machine) -> Request {
+    let size = if planning.fit {
+        Size::Fit
+    } else {
+        let (x, y) = planning.place.unwrap_or((0.0, 0.0));
+        Size::Given { scale: planning.scale.unwrap_or(1.0), origin: drawing::Vec2::new(x, y) }
+    };
+    let period = planning.period.unwrap_or(machine.parts().period);
+    Request {
+        tolerance_mm: planning.tolerance,
+        period_us: (period * 1e6).round().max(0.0) as u64,
+        order: planning.order.into(),
+        wish: Wish { rotate: planning.rotate.unwrap_or(0.0).to_radians(), size },
+    }
+}

@@ -1,0 +1,62 @@
+//! `plotplan check`: what a file says, and what would not plot.
+
+use hpgl::Severity;
+use planner::placement;
+use plotplan::report::metres;
+
+use crate::cli::Check;
+use crate::failure::Failure;
+use crate::{input, output, terminal};
+
+pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
+    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let input = input::read(&arguments.file)?;
+    let reading = input::drawing(&input, arguments.strict)?;
+    let mut refused = false;
+    let mut text = format!("{}: {} commands\n", input.name, reading.summary.commands);
+    for (number, page) in reading.pages.iter().enumerate() {
+        let drawing = &page.drawing;
+        if reading.pages.len() > 1 {
+            text.push_str(&format!("page {}: ", number + 1));
+        }
+        match drawing.bounding_box() {
+            Some(bounds) => text.push_str(&format!(
+                "{} strokes, {} of ink from {:.2}, {:.2} to {:.2}, {:.2} mm, pens {}\n",
+                drawing.strokes.len(),
+                metres(drawing.length()),
+                bounds.x0,
+                bounds.y0,
+                bounds.x1,
+                bounds.y1,
+                drawing.pens().iter().map(|pen| pen.0.to_string()).collect::<Vec<_>>().join(", ")
+            )),
+            None => text.push_str("no ink\n"),
+        }
+    }
+    if let Some(machine) = &machine {
+        let drawing = &reading.pages[0].drawing;
+        let request = super::request(&arguments.planning, &machine.machine);
+        let placed = placement::place(&machine.machine, drawing, &request.wish).and_then(|map| {
+            let mut placed = drawing.clone();
+            placed.transform(map);
+            planner::check_reach(&machine.machine, &placed).map(|()| placed)
+        });
+        match placed {
+            Ok(placed) => {
+                text.push_str(&format!("{} can draw it\n", machine.machine.name()));
+                let beyond = placement::beyond_sheet(&machine.machine, &placed);
+                if beyond > 1e-6 {
+                    terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));
+                    refused |= arguments.strict;
+                }
+            }
+            Err(error) => match super::convert::explain(&input, drawing, &machine.machine, &request, error) {
+                Failure::Refused => refused = true,
+                other => return Err(other),
+            },
+        }
+    }
+    output::write("-", |out| out.write_all(text.as_bytes()))?;
+    let loses_ink = reading.diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
+    if refused || loses_ink { Err(Failure::Refused) } else { Ok(()) }
+}

@@ -1,0 +1,164 @@
+//! `plotplan convert`: a drawing into a plan, or into a clean drawing.
+
+use annotate_snippets::Level;
+use drawing::Drawing;
+use kinematics::Machine;
+use planner::PlanError;
+use planner::placement::{Size, Wish, place};
+use plotplan::pipeline::{self, Compiled, Request};
+use plotplan::report;
+use serde_json::json;
+use sha2::Digest as _;
+
+use crate::cli::{Convert, Format, ReportForm};
+use crate::failure::Failure;
+use crate::input::{self, Input, LoadedMachine};
+use crate::output;
+use crate::terminal::{self, Progress};
+
+pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
+    // What is wrong with the machine shows before a long read.
+    let machine = match (arguments.format, &arguments.machine) {
+        (Format::Hpgl | Format::Svg, _) => None,
+        (_, Some(name)) => Some(input::machine(name)?),
+        (_, None) => {
+            let what = "which machine is the plan for? Give --machine NAME (see `plotplan machine list`) or --machine FILE.toml";
+            return Err(Failure::Usage(anyhow::anyhow!(what)));
+        }
+    };
+    let input = input::read(&arguments.file)?;
+    if formats::looks_like_plan(&input.bytes) {
+        let what = format!("{} is a plan already; convert takes a drawing", input.name);
+        return Err(Failure::Drawing(anyhow::anyhow!(what)));
+    }
+    let reading = input::drawing(&input, arguments.strict)?;
+    let drawing = &reading.pages[0].drawing;
+    if reading.pages.len() > 1 {
+        terminal::warning(&format!("{} has {} pages; only the first is taken", input.name, reading.pages.len()));
+    }
+    match machine {
+        Some(machine) => plan(arguments, &input, drawing, &machine),
+        None => write_drawing(arguments, drawing),
+    }
+}
+
+fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> {
+    output::write(&arguments.output, |out| match arguments.format {
+        Format::Svg => formats::svg::write(drawing, out),
+        _ => out.write_all(&hpgl::emit(drawing, &hpgl::EmitOptions::default())),
+    })
+}
+
+fn plan(
+    arguments: &Convert,
+    input: &Input,
+    drawing: &Drawing,
+    machine: &LoadedMachine,
+) -> Result<(), Failure> {
+    let request = super::request(&arguments.planning, &machine.machine);
+    let compiled = compile(input, drawing, &machine.machine, &request)?;
+    if compiled.beyond_sheet_mm > 1e-6 {
+        terminal::warning(&format!(
+            "ink reaches {:.2} mm beyond the sheet (the machine can draw there); --fit keeps it on the sheet",
+            compiled.beyond_sheet_mm
+        ));
+        if arguments.strict {
+            return Err(Failure::Refused);
+        }
+    }
+    let summary = report::summary(&compiled);
+    let certificate = report::certificate(&compiled.certificate);
+    let said = match arguments.report {
+        ReportForm::Text => {
+            let text = report::summary_text(&machine.machine, &compiled);
+            format!("{text}{}", report::certificate_text(&compiled.certificate))
+        }
+        ReportForm::Json => format!("{}\n", json!({ "summary": summary, "certificate": certificate })),
+    };
+    if !compiled.certificate.holds {
+        terminal::error("the plan does not hold its certificate and is not written; please report this drawing");
+        terminal::say(&said);
+        return Err(Failure::Refused);
+    }
+    let rows = || compiled.trajectory.rows().map(|row| row.row);
+    output::write(&arguments.output, |out| {
+        let written = match arguments.format {
+            Format::Csv => formats::csv::write(&compiled.header, rows(), out),
+            Format::Json => {
+                let document = formats::json::Document {
+                    source: formats::json::Source {
+                        name: input.name.clone(),
+                        sha256: sha256(&input.bytes),
+                    },
+                    machine: serde_json::to_value(&machine.file)?,
+                    settings: report::settings(&request),
+                    summary,
+                    certificate,
+                };
+                formats::json::write(&document, &compiled.header, rows, out)
+            }
+            _ => formats::ticks::write(&compiled.header, rows(), out),
+        };
+        written.map_err(|error| match error {
+            formats::WriteError::Io(error) => error,
+            other => std::io::Error::other(other),
+        })
+    })?;
+    terminal::say(&said);
+    Ok(())
+}
+
+/// Compiles with progress, and explains where it cannot be done.
+pub(super) fn compile<'a>(
+    input: &Input,
+    drawing: &Drawing,
+    machine: &'a Machine,
+    request: &Request,
+) -> Result<Compiled<'a>, Failure> {
+    let progress = Progress::new();
+    let compiled = pipeline::compile(drawing, machine, request, &|step| progress.step(step));
+    progress.finish();
+    compiled.map_err(|error| explain(input, drawing, machine, request, error))
+}
+
+/// Says why a drawing cannot be planned, where, and what would help.
+pub(super) fn explain(
+    input: &Input,
+    drawing: &Drawing,
+    machine: &Machine,
+    request: &Request,
+    error: PlanError,
+) -> Failure {
+    let PlanError::OutOfReach { stroke, pen, span, source } = &error else {
+        return match error {
+            PlanError::Setting { .. } => Failure::Usage(error.into()),
+            other => Failure::Drawing(anyhow::Error::new(other).context(format!("{} cannot be planned", input.name))),
+        };
+    };
+    let place_text = format!(
+        "byte {}, stroke {} of {} in the file's order, pen {}; positions are in the machine's frame, the sheet is {:.2}, {:.2} to {:.2}, {:.2} mm",
+        span.start,
+        stroke + 1,
+        drawing.strokes.len(),
+        pen.0,
+        machine.sheet().x0,
+        machine.sheet().y0,
+        machine.sheet().x1,
+        machine.sheet().y1,
+    );
+    let fit = Wish { size: Size::Fit, ..request.wish };
+    let help = match place(machine, drawing, &fit) {
+        Ok(map) => {
+            let [a, b, ..] = map.as_coeffs();
+            format!("--fit makes it fit, scaled by {:.4}; or choose --scale, --rotate and --place", libm::hypot(a, b))
+        }
+        Err(_) => "--scale, --rotate and --place move it".to_owned(),
+    };
+    let title = format!("the drawing leaves the reach of {}: {source}", machine.name());
+    terminal::at_place(input, *span, Level::ERROR, None, &title, &place_text, Some(&help));
+    Failure::Refused
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,86 @@
+//! `plotplan info`: lengths, pens, bounds, and with a machine the time a drawing takes.
+
+use std::fmt::Write as _;
+
+use plotplan::report::{self, clock, metres};
+
+use crate::cli::Info;
+use crate::failure::Failure;
+use crate::input::{self, Input};
+use crate::output;
+
+pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
+    let input = input::read(&arguments.file)?;
+    let text = if formats::looks_like_plan(&input.bytes) {
+        of_plan(&input, arguments.machine.as_deref())?
+    } else {
+        of_drawing(&input, arguments)?
+    };
+    output::write("-", |out| out.write_all(text.as_bytes()))
+}
+
+fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
+    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let reading = input::drawing(input, false)?;
+    let mut text = format!("drawing  {}\n", input.name);
+    let _ = writeln!(text, "commands {}", reading.summary.commands);
+    for (number, page) in reading.pages.iter().enumerate() {
+        let drawing = &page.drawing;
+        if reading.pages.len() > 1 {
+            let _ = writeln!(text, "page     {}", number + 1);
+        }
+        let Some(bounds) = drawing.bounding_box() else {
+            text.push_str("ink      none\n");
+            continue;
+        };
+        let dots = drawing.strokes.iter().filter(|stroke| stroke.is_dot()).count();
+        let _ = writeln!(text, "strokes  {} ({dots} dots)", drawing.strokes.len());
+        let _ = writeln!(text, "ink      {}", metres(drawing.length()));
+        let _ = writeln!(
+            text,
+            "bounds   {:.2}, {:.2} to {:.2}, {:.2} mm ({:.2} x {:.2})",
+            bounds.x0,
+            bounds.y0,
+            bounds.x1,
+            bounds.y1,
+            bounds.width(),
+            bounds.height()
+        );
+        for pen in drawing.pens() {
+            let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
+            let (count, length) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
+            let _ = writeln!(text, "pen {:<4} {count} strokes, {}", pen.0, metres(length));
+        }
+    }
+    if let Some(machine) = machine {
+        let request = super::request(&arguments.planning, &machine.machine);
+        let drawing = &reading.pages[0].drawing;
+        let compiled = super::convert::compile(input, drawing, &machine.machine, &request)?;
+        text.push('\n');
+        text.push_str(&report::summary_text(&machine.machine, &compiled));
+        text.push_str(&report::certificate_text(&compiled.certificate));
+    }
+    Ok(text)
+}
+
+fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
+    let (plan, machine) = super::verify::plan(input, machine)?;
+    let header = &plan.table.header;
+    let mut text = format!("plan     {}\n", input.name);
+    let _ = writeln!(text, "machine  {}", header.machine);
+    let _ = writeln!(text, "time     {}", clock(header.duration_us as f64 * 1e-6));
+    let _ = writeln!(text, "rows     {} every {} us", header.rows, header.period_us);
+    for motor in &header.motors {
+        let limits = &motor.limits;
+        let _ = writeln!(
+            text,
+            "motor    {}: at most {:.1} ticks/s, {:.1} ticks/s2",
+            motor.name, limits.speed, limits.acceleration
+        );
+    }
+    let certificate = super::verify::replay(&plan, &machine.machine, None, f64::INFINITY);
+    let _ = writeln!(text, "ink      {}", metres(certificate.ink_mm));
+    let _ = writeln!(text, "travel   {}", metres(certificate.travel_mm));
+    let _ = writeln!(text, "pens     {:?}, down {} times", certificate.pens, certificate.pen_downs);
+    Ok(text)
+}

@@ -1,0 +1,86 @@
+//! `plotplan machine`: list, show and check machines.
+
+use std::fmt::Write as _;
+
+use drawing::{Line, Point, Segment};
+use plotplan::machine_file::PRESETS;
+
+use crate::cli::Machine;
+use crate::failure::Failure;
+use crate::{input, output, terminal};
+
+pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
+    let text = match arguments {
+        Machine::List => PRESETS.iter().fold(String::new(), |mut text, preset| {
+            let _ = writeln!(text, "{:<10} {}", preset.name, preset.about);
+            text
+        }),
+        Machine::Show { name } => {
+            // Only a machine that can be used is shown.
+            input::machine(name)?;
+            input::machine_toml(name)?
+        }
+        Machine::Check { file } => check(file)?,
+    };
+    output::write("-", |out| out.write_all(text.as_bytes()))
+}
+
+fn check(file: &str) -> Result<String, Failure> {
+    let machine = input::machine(file)?.machine;
+    let sheet = machine.sheet();
+    let mut text = format!("{} holds together\n", machine.name());
+    let joints = machine.geometry().joint_names();
+    for (k, motor) in machine.motors().iter().enumerate() {
+        let row = machine.coupling().matrix().row(k);
+        let _ = writeln!(
+            text,
+            "motor {}: {:.4} * ({} {} + {} {}) + {:.4} ticks, at most {:.1} ticks/s, {:.1} ticks/s2",
+            motor.name, motor.counts, row[0], joints[0], row[1], joints[1], motor.offset, motor.max_speed, motor.max_acceleration
+        );
+    }
+    let start = machine.ticks(&machine.start());
+    let _ = writeln!(text, "start at ticks {}, {}", start.x.round(), start.y.round());
+    let middle = sheet.center();
+    if let Ok(pose) = machine.pose_near(middle, &machine.start()) {
+        let _ = writeln!(text, "tick floor in the middle of the sheet: {:.4} mm", machine.tick_floor(&pose));
+    }
+    let corners = [
+        Point::new(sheet.x0, sheet.y0),
+        Point::new(sheet.x1, sheet.y0),
+        Point::new(sheet.x1, sheet.y1),
+        Point::new(sheet.x0, sheet.y1),
+    ];
+    let mut whole = true;
+    for (k, name) in ["lower", "right", "upper", "left"].into_iter().enumerate() {
+        let edge = Segment::Line(Line::new(corners[k], corners[(k + 1) % 4]));
+        if let Err(out) = machine.check_segment(&edge) {
+            whole = false;
+            terminal::warning(&format!("not all of the sheet's {name} edge can be drawn: {out}"));
+        }
+    }
+    // An arm may reach all edges and not the middle.
+    let steps = 40;
+    let missed = (1..steps)
+        .flat_map(|i| (1..steps).map(move |j| (i, j)))
+        .filter(|(i, j)| {
+            let at = |low: f64, size: f64, k: i32| low + size * f64::from(k) / f64::from(steps);
+            let p = Point::new(at(sheet.x0, sheet.width(), *i), at(sheet.y0, sheet.height(), *j));
+            machine.check_point(p).is_err()
+        })
+        .count();
+    if missed > 0 {
+        whole = false;
+        let share = 100.0 * missed as f64 / f64::from((steps - 1) * (steps - 1));
+        terminal::warning(&format!("about {share:.0} % of the sheet's inside is out of reach"));
+    }
+    let _ = writeln!(
+        text,
+        "sheet {:.2}, {:.2} to {:.2}, {:.2} mm: {}",
+        sheet.x0,
+        sheet.y0,
+        sheet.x1,
+        sheet.y1,
+        if whole { "all of it can be drawn on" } else { "parts of it cannot be drawn on" }
+    );
+    Ok(text)
+}

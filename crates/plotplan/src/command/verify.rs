@@ -1,0 +1,85 @@
+//! `plotplan verify`: the certificate, recomputed from the plan's ticks.
+
+use anyhow::Context as _;
+use drawing::{Affine, Drawing};
+use formats::PlanFile;
+use kinematics::Machine;
+use plotplan::machine_file::MachineFile;
+use plotplan::report;
+use serde_json::json;
+use verify::{Certificate, Verifier};
+
+use crate::cli::{ReportForm, Verify};
+use crate::failure::Failure;
+use crate::input::{self, Input, LoadedMachine};
+use crate::{output, terminal};
+
+/// What plans are made for when nothing else is said.
+const DEFAULT_TOLERANCE_MM: f64 = 0.1;
+
+pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
+    let input = input::read(&arguments.plan)?;
+    let (plan, machine) = plan(&input, arguments.machine.as_deref())?;
+    let drawing = match &arguments.drawing {
+        None => None,
+        Some(file) => {
+            let input = input::read(file)?;
+            let mut drawing = input::drawing(&input, false)?.pages.swap_remove(0).drawing;
+            drawing.transform(Affine::new(plan.table.header.placement));
+            Some(drawing)
+        }
+    };
+    let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
+    let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
+    let certificate = replay(&plan, &machine.machine, drawing.as_ref(), tolerance);
+    match arguments.report {
+        ReportForm::Text => {
+            if drawing.is_none() {
+                terminal::warning("without --drawing only the motion is verified, not what it draws");
+            }
+            let text = report::certificate_text(&certificate);
+            output::write("-", |out| out.write_all(text.as_bytes()))?;
+        }
+        ReportForm::Json => {
+            let text = format!("{}\n", json!({ "certificate": report::certificate(&certificate) }));
+            output::write("-", |out| out.write_all(text.as_bytes()))?;
+        }
+    }
+    if certificate.holds { Ok(()) } else { Err(Failure::Refused) }
+}
+
+/// Reads a plan and finds its machine: the one named on the command line, the one in the plan document, or the preset of
+/// its name.
+pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, LoadedMachine), Failure> {
+    let plan = formats::read_plan(&input.bytes)
+        .with_context(|| format!("{} is not a plan that can be used", input.name))
+        .map_err(Failure::Drawing)?;
+    let machine = match (machine, &plan.document) {
+        (Some(name), _) => input::machine(name)?,
+        (None, Some(document)) => {
+            let what = || "the machine in the plan document cannot be used";
+            let file: MachineFile = serde_json::from_value(document.machine.clone())
+                .with_context(what)
+                .map_err(Failure::Drawing)?;
+            let machine = file.machine().with_context(what).map_err(Failure::Drawing)?;
+            LoadedMachine { file, machine }
+        }
+        (None, None) => input::machine(&plan.table.header.machine)?,
+    };
+    Ok((plan, machine))
+}
+
+/// Replays a plan. Without a drawing there is nothing to hold its ink against but itself.
+pub(super) fn replay(
+    plan: &PlanFile,
+    machine: &Machine,
+    drawing: Option<&Drawing>,
+    tolerance: f64,
+) -> Certificate {
+    let none = Drawing::default();
+    let mut verifier = Verifier::new(machine, drawing.unwrap_or(&none), &plan.table.header, tolerance);
+    for row in &plan.table.rows {
+        verifier.row(*row, None);
+    }
+    verifier.finish()
+}

@@ -1,0 +1,44 @@
+//! How a command fails: what is said and with which exit code.
+
+use std::process::ExitCode;
+
+use crate::terminal;
+
+/// Why a command stops.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The drawing cannot be planned, or a certificate does not hold: exit 1. All has been said already.
+    Refused,
+    /// The drawing cannot be planned: exit 1.
+    Drawing(anyhow::Error),
+    /// The command line or a machine file is wrong: exit 2.
+    Usage(anyhow::Error),
+    /// Reading or writing failed: exit 3.
+    Io(anyhow::Error),
+    /// Whoever read our output has seen enough: quiet, exit 0.
+    ClosedPipe,
+}
+
+impl Failure {
+    /// Says what is left to say and gives the exit code.
+    pub(crate) fn report(self) -> ExitCode {
+        let (code, error) = match self {
+            Self::ClosedPipe => return ExitCode::SUCCESS,
+            Self::Refused => return ExitCode::from(1),
+            Self::Drawing(error) => (1, error),
+            Self::Usage(error) => (2, error),
+            Self::Io(error) => (3, error),
+        };
+        terminal::error(&format!("{error:#}"));
+        ExitCode::from(code)
+    }
+
+    /// A failure to write to `to`.
+    pub(crate) fn writing(error: std::io::Error, to: &str) -> Self {
+        if error.kind() == std::io::ErrorKind::BrokenPipe {
+            Self::ClosedPipe
+        } else {
+            Self::Io(anyhow::Error::new(error).context(format!("cannot write {to}")))
+        }
+    }
+}

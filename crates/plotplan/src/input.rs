@@ -1,0 +1,75 @@
+//! Reading files and standard input, drawings and machines.
+
+use std::io::Read as _;
+use std::path::Path;
+
+use anyhow::Context as _;
+use hpgl::{Reading, Severity};
+use kinematics::Machine;
+use plotplan::machine_file::{MachineFile, PRESETS, nearest};
+
+use crate::failure::Failure;
+use crate::terminal;
+
+/// A file's bytes and what to call it.
+pub(crate) struct Input {
+    pub(crate) name: String,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// Reads a file, or standard input for `-`.
+pub(crate) fn read(file: &str) -> Result<Input, Failure> {
+    if file == "-" {
+        let mut bytes = Vec::new();
+        std::io::stdin().lock().read_to_end(&mut bytes).context("cannot read standard input").map_err(Failure::Io)?;
+        return Ok(Input { name: "standard input".into(), bytes });
+    }
+    let bytes = std::fs::read(file).with_context(|| format!("cannot read {file}")).map_err(Failure::Io)?;
+    // Only the file's own name: a plan must not depend on where the drawing lies.
+    let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy().into_owned());
+    Ok(Input { name, bytes })
+}
+
+/// Reads a drawing and says what there is to say about it. With `strict` a warning refuses it.
+pub(crate) fn drawing(input: &Input, strict: bool) -> Result<Reading, Failure> {
+    let reading = hpgl::read(&input.bytes, &hpgl::Options::default());
+    terminal::diagnostics(input, &reading.diagnostics);
+    let warned = reading.diagnostics.iter().any(|diagnostic| diagnostic.severity >= Severity::Warning);
+    if strict && warned {
+        terminal::error("there are warnings, and --strict takes them for errors");
+        return Err(Failure::Refused);
+    }
+    Ok(reading)
+}
+
+/// A machine with the file it came from.
+pub(crate) struct LoadedMachine {
+    pub(crate) file: MachineFile,
+    pub(crate) machine: Machine,
+}
+
+/// The machine that `--machine` names: a preset, or a machine file.
+pub(crate) fn machine(name: &str) -> Result<LoadedMachine, Failure> {
+    let toml = machine_toml(name)?;
+    let wrong = || format!("machine {name} cannot be used");
+    let file = MachineFile::parse(&toml).with_context(wrong).map_err(Failure::Usage)?;
+    let machine = file.machine().with_context(wrong).map_err(Failure::Usage)?;
+    Ok(LoadedMachine { file, machine })
+}
+
+/// The text of the machine file that a name stands for.
+pub(crate) fn machine_toml(name: &str) -> Result<String, Failure> {
+    if let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) {
+        return Ok(preset.toml.to_owned());
+    }
+    let is_path = name.contains(['/', '\\']) || Path::new(name).extension().is_some_and(|e| e == "toml");
+    if is_path || Path::new(name).is_file() {
+        return std::fs::read_to_string(name)
+            .with_context(|| format!("cannot read the machine file {name}"))
+            .map_err(Failure::Io);
+    }
+    let names: Vec<&str> = PRESETS.iter().map(|preset| preset.name).collect();
+    let hint = nearest(name, names.iter().copied())
+        .map_or_else(|| format!("there are {}", names.join(", ")), |near| format!("did you mean {near}?"));
+    Err(Failure::Usage(anyhow::anyhow!("there is no machine called {name}: {hint} (or give a machine file, NAME.toml)")))
+}

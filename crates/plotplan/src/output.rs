@@ -1,0 +1,42 @@
+//! Writing to a file or standard output, whole or not at all.
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use crate::failure::Failure;
+
+/// Calls `write` with where the output goes: standard output for `-`, otherwise a temporary file beside `to` that takes
+/// its name only when all of it has been written.
+pub(crate) fn write(
+    to: &str,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), Failure> {
+    if to == "-" {
+        let mut out = BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
+        return write(&mut out)
+            .and_then(|()| out.flush())
+            .map_err(|error| Failure::writing(error, "standard output"));
+    }
+    let path = Path::new(to);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let failed = |error: std::io::Error| Failure::writing(error, to);
+    // A device or a pipe cannot be replaced by another file: it is written as it is.
+    if path.exists() && !path.is_file() {
+        let mut out = BufWriter::new(std::fs::OpenOptions::new().write(true).open(path).map_err(failed)?);
+        return write(&mut out).and_then(|()| out.flush()).map_err(failed);
+    }
+    let mut temporary = tempfile::Builder::new();
+    temporary.prefix(".plotplan-");
+    #[cfg(unix)]
+    {
+        // As any new file, not for the owner alone: the process's own mask still applies.
+        use std::os::unix::fs::PermissionsExt as _;
+        temporary.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let file = temporary.tempfile_in(folder).map_err(failed)?;
+    let mut out = BufWriter::with_capacity(1 << 16, file);
+    write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
+    let file = out.into_inner().map_err(|error| failed(error.into_error()))?;
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}

@@ -1,0 +1,193 @@
+//! From a drawing to a certified plan: each room's work, one after the other.
+
+use drawing::{Affine, Drawing, Point, Rect};
+use kinematics::Machine;
+use plan::{Header, Limits, Motor};
+use planner::placement::{self, Wish};
+use planner::{PlanError, Settings, Trajectory};
+use verify::{Certificate, Verifier};
+
+/// In which order strokes are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Reordered, reversed and joined to spend the least time with the pen up.
+    Optimize,
+    /// As in the file.
+    File,
+}
+
+impl Order {
+    /// What the command line calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Optimize => "optimize",
+            Self::File => "file",
+        }
+    }
+}
+
+/// What kind of plan is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Largest distance between the drawing and the pen's continuous path, mm.
+    pub tolerance_mm: f64,
+    /// Time between rows, microseconds.
+    pub period_us: u64,
+    /// In which order strokes are drawn.
+    pub order: Order,
+    /// Where the drawing goes.
+    pub wish: Wish,
+}
+
+/// A step of the work, for whoever shows progress.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Looking for the place and checking reach.
+    Placing,
+    /// Finding an order.
+    Ordering,
+    /// Planning motion.
+    Planning,
+    /// Replaying the plan; so many rows of so many are done.
+    Verifying(u64, u64),
+}
+
+/// A plan with all that is known about it.
+#[derive(Clone, Debug)]
+pub struct Compiled<'a> {
+    /// The plan.
+    pub trajectory: Trajectory<'a>,
+    /// What is true of all its rows.
+    pub header: Header,
+    /// From drawing mm to machine mm.
+    pub placement: Affine,
+    /// The drawing where it lies on the machine, in the file's order; machine mm.
+    pub placed: Drawing,
+    /// How far ink reaches beyond the sheet, mm.
+    pub beyond_sheet_mm: f64,
+    /// What ordering brought, where it was asked for.
+    pub ordering: Option<ordering::Report>,
+    /// How many strokes are drawn, after ordering joined those that touch.
+    pub strokes: usize,
+    /// What the verifier found.
+    pub certificate: Certificate,
+}
+
+/// Rows between two calls that tell of progress.
+const PROGRESS_ROWS: u64 = 100_000;
+
+/// Places the drawing, orders its strokes, plans and verifies. `progress` is told of every step.
+///
+/// # Errors
+/// When the drawing has no ink, cannot be placed, or leaves what the machine can draw.
+pub fn compile<'a>(
+    drawing: &Drawing,
+    machine: &'a Machine,
+    request: &Request,
+    progress: &dyn Fn(Step),
+) -> Result<Compiled<'a>, PlanError> {
+    progress(Step::Placing);
+    let placement = placement::place(machine, drawing, &request.wish)?;
+    let mut placed = drawing.clone();
+    placed.transform(placement);
+    planner::check_reach(machine, &placed)?;
+    let beyond_sheet_mm = placement::beyond_sheet(machine, &placed);
+
+    let (ordered, ordering) = match request.order {
+        Order::File => (placed.clone(), None),
+        Order::Optimize => {
+            progress(Step::Ordering);
+            let start = machine.geometry().forward(&machine.start());
+            let options =
+                ordering::Options { start: Some(start), park: Some(start), ..ordering::Options::default() };
+            let cost = |a: Point, b: Point| planner::travel_time(machine, a, b);
+            let (ordered, report) = ordering::optimize(placed.clone(), &cost, &options);
+            (ordered, Some(report))
+        }
+    };
+    let strokes = ordered.strokes.len();
+
+    progress(Step::Planning);
+    let settings = Settings { tolerance: request.tolerance_mm, period_us: request.period_us, park: None };
+    let trajectory = planner::plan(machine, &ordered, &settings)?;
+    drop(ordered);
+
+    let header = Header {
+        machine: machine.name().to_owned(),
+        motors: machine.motors().clone().map(|motor| Motor {
+            name: motor.name,
+            limits: Limits {
+                speed: motor.max_speed,
+                acceleration: motor.max_acceleration,
+                jerk: motor.max_jerk,
+            },
+        }),
+        placement: placement.as_coeffs(),
+        period_us: request.period_us,
+        rows: trajectory.row_count(),
+        duration_us: trajectory.duration_us(),
+    };
+    // Against the drawing in the file's order: what ordering lost or changed would show.
+    let mut verifier = Verifier::new(machine, &placed, &header, request.tolerance_mm);
+    for (done, row) in trajectory.rows().enumerate() {
+        if (done as u64).is_multiple_of(PROGRESS_ROWS) {
+            progress(Step::Verifying(done as u64, header.rows));
+        }
+        verifier.row(row.row, Some(row.exact));
+    }
+    let certificate = verifier.finish();
+    Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
+}
+
+/// The outlines of what a machine can reach, machine mm, for pictures; empty where only the sheet limits it.
+pub fn reach_outlines(machine: &Machine) -> Vec<Vec<Point>> {
+    // The border between reachable and not, along rays from the base: each ray enters and leaves the reach once.
+    let Some(base) = machine.geometry().base() else {
+        let joints = machine.parts().joints;
+        let bed = Rect::new(joints[0].min, joints[1].min, joints[0].max, joints[1].max);
+        if !bed.is_finite() {
+            return Vec::new();
+        }
+        return vec![vec![
+            Point::new(bed.x0, bed.y0),
+            Point::new(bed.x1, bed.y0),
+            Point::new(bed.x1, bed.y1),
+            Point::new(bed.x0, bed.y1),
+        ]];
+    };
+    let reachable = |p: Point| machine.check_point(p).is_ok();
+    let mut inner = Vec::new();
+    let mut outer = Vec::new();
+    let mut whole_turn = true;
+    for degree in 0..=360 {
+        let (sin, cos) = libm::sincos(f64::from(degree) * std::f64::consts::PI / 180.0);
+        let at = |r: f64| base + r * drawing::Vec2::new(cos, sin);
+        let Some((near, far)) = reach_along(&|r| reachable(at(r))) else {
+            whole_turn = false;
+            continue;
+        };
+        inner.push(at(near));
+        outer.push(at(far));
+    }
+    if whole_turn {
+        return vec![outer, inner];
+    }
+    inner.reverse();
+    outer.extend(inner);
+    vec![outer]
+}
+
+/// The first and the last distance at which `reachable` holds, to a hundredth of a mm; looked for in steps of 1 mm up to 3 m.
+fn reach_along(reachable: &dyn Fn(f64) -> bool) -> Option<(f64, f64)> {
+    let samples = || (1..3000).map(f64::from);
+    let first = samples().find(|r| reachable(*r))?;
+    let last = samples().skip(first as usize).take_while(|r| reachable(*r)).last().unwrap_or(first);
+    let border = |mut inside: f64, mut outside: f64| {
+        while (inside - outside).abs() > 0.01 {
+            let middle = 0.5 * (inside + outside);
+            if reachable(middle) { inside = middle } else { outside = middle }
+        }
+        inside
+    };
+    Some((border(first, first - 1.0), border(last, last + 1.0)))
+}

@@ -1,0 +1,215 @@
+//! What came of a plan: the summary and the certificate, as text for people and as JSON for programs.
+
+use std::fmt::Write as _;
+
+use kinematics::Machine;
+use serde_json::{Value, json};
+use verify::{Certificate, Deviation, MotorPeak, Spread};
+
+use crate::pipeline::{Compiled, Request};
+
+/// The settings a plan was made with, as JSON.
+pub fn settings(request: &Request) -> Value {
+    json!({
+        "tolerance_mm": request.tolerance_mm,
+        "period_us": request.period_us,
+        "order": request.order.name(),
+    })
+}
+
+/// The summary of a plan, as JSON: lengths in mm, times in s.
+pub fn summary(compiled: &Compiled<'_>) -> Value {
+    let times = compiled.trajectory.times();
+    let certificate = &compiled.certificate;
+    json!({
+        "strokes": compiled.placed.strokes.len(),
+        "strokes_drawn": compiled.strokes,
+        "dots": certificate.dots,
+        "pens": certificate.pens,
+        "ink_mm": certificate.ink_mm,
+        "travel_mm": certificate.travel_mm,
+        "beyond_sheet_mm": compiled.beyond_sheet_mm,
+        "rows": compiled.header.rows,
+        "duration_s": compiled.header.duration_us as f64 * 1e-6,
+        "drawing_s": times.drawing,
+        "travel_s": times.travel,
+        "lifting_s": times.lifting,
+        "placement": compiled.placement.as_coeffs(),
+        "ordering": compiled.ordering.as_ref().map(|report| json!({
+            "strokes_before": report.strokes_before,
+            "strokes_after": report.strokes_after,
+            "merged": report.merged,
+            "travel_mm_before": report.travel_mm_before,
+            "travel_mm_after": report.travel_mm_after,
+            "travel_s_before": report.travel_cost_before,
+            "travel_s_after": report.travel_cost_after,
+        })),
+    })
+}
+
+/// A certificate as JSON.
+pub fn certificate(certificate: &Certificate) -> Value {
+    json!({
+        "holds": certificate.holds,
+        "failures": certificate.failures.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "tolerance_mm": certificate.tolerance_mm,
+        "before_rounding": certificate.before_rounding.as_ref().map(deviation),
+        "after_rounding": deviation(&certificate.after_rounding),
+        "tick_floor": {
+            "worst_mm": certificate.tick_floor.worst_mm,
+            "rms_mm": certificate.tick_floor.rms_mm,
+        },
+        "largest_rounding_ticks": certificate.largest_rounding,
+        "pens": certificate.pens,
+        "motors": certificate.motors.iter().map(motor).collect::<Vec<_>>(),
+        "rows": certificate.rows,
+        "duration_s": certificate.duration_us as f64 * 1e-6,
+        "ink_mm": certificate.ink_mm,
+        "travel_mm": certificate.travel_mm,
+        "pen_downs": certificate.pen_downs,
+        "dots": certificate.dots,
+    })
+}
+
+fn deviation(deviation: &Deviation) -> Value {
+    let spread = |spread: &Spread| {
+        json!({
+            "max_mm": spread.max_mm,
+            "p99_mm": spread.p99_mm,
+            "more": spread.more,
+            "unseen_mm": spread.unseen_mm,
+        })
+    };
+    json!({
+        "ink_to_drawing": spread(&deviation.ink_to_drawing),
+        "drawing_to_ink": spread(&deviation.drawing_to_ink),
+    })
+}
+
+fn motor(peak: &MotorPeak) -> Value {
+    json!({
+        "name": peak.name,
+        "speed": peak.speed,
+        "speed_limit": peak.speed_limit,
+        "speed_share": peak.speed_share,
+        "speed_share_p999": peak.speed_share_p999,
+        "acceleration": peak.acceleration,
+        "acceleration_limit": peak.acceleration_limit,
+        "acceleration_share": peak.acceleration_share,
+        "acceleration_share_p999": peak.acceleration_share_p999,
+    })
+}
+
+/// The summary of a plan, for people.
+pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
+    let times = compiled.trajectory.times();
+    let certificate = &compiled.certificate;
+    let mut text = String::new();
+    let strokes = compiled.placed.strokes.len();
+    let _ = write!(
+        text,
+        "{}: {} stroke{}, {} of ink",
+        machine.name(),
+        strokes,
+        if strokes == 1 { "" } else { "s" },
+        metres(certificate.ink_mm)
+    );
+    if compiled.strokes != strokes {
+        let _ = write!(text, " in {} pen downs", compiled.strokes);
+    }
+    let [a, b, ..] = compiled.placement.as_coeffs();
+    let scale = libm::hypot(a, b);
+    if (scale - 1.0).abs() > 1e-12 {
+        let _ = write!(text, ", scaled by {scale:.4}");
+    }
+    let _ = writeln!(
+        text,
+        "\ntime {}: drawing {}, travel {}, pen lifts and drops {}",
+        clock(compiled.header.duration_us as f64 * 1e-6),
+        clock(times.drawing),
+        clock(times.travel),
+        clock(times.lifting)
+    );
+    if let Some(report) = &compiled.ordering {
+        let _ = writeln!(
+            text,
+            "travel {} instead of {} in the file's order",
+            metres(report.travel_mm_after),
+            metres(report.travel_mm_before)
+        );
+    }
+    text
+}
+
+/// A certificate, for people.
+pub fn certificate_text(certificate: &Certificate) -> String {
+    let mut text = String::new();
+    let verdict = if certificate.holds { "holds" } else { "DOES NOT HOLD" };
+    let _ = writeln!(text, "certificate {verdict} (tolerance {} mm)", certificate.tolerance_mm);
+    if let Some(before) = &certificate.before_rounding {
+        deviation_text(&mut text, "before rounding to ticks", before);
+    }
+    deviation_text(&mut text, "in whole ticks", &certificate.after_rounding);
+    let _ = writeln!(
+        text,
+        "  tick floor of this machine here: {:.4} mm worst, {:.4} mm RMS",
+        certificate.tick_floor.worst_mm, certificate.tick_floor.rms_mm
+    );
+    for peak in &certificate.motors {
+        let _ = writeln!(
+            text,
+            "  motor {}: speed at most {:.1} % of its limit, acceleration {:.1} %",
+            peak.name,
+            100.0 * peak.speed_share,
+            100.0 * peak.acceleration_share
+        );
+    }
+    for failure in &certificate.failures {
+        let _ = writeln!(text, "  FAILED: {failure}");
+    }
+    text
+}
+
+fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
+    let spread = |spread: &Spread| {
+        let more = if spread.more { "more than " } else { "" };
+        format!("{more}{:.4} mm (99 %: {:.4})", spread.max_mm, spread.p99_mm)
+    };
+    let _ = writeln!(
+        text,
+        "  {what}: ink strays by at most {}, drawing missed by at most {}",
+        spread(&deviation.ink_to_drawing),
+        spread(&deviation.drawing_to_ink)
+    );
+}
+
+/// A length for people.
+pub fn metres(mm: f64) -> String {
+    if mm >= 1000.0 { format!("{:.2} m", mm / 1000.0) } else { format!("{mm:.1} mm") }
+}
+
+/// A time for people: hours and minutes where there are any.
+pub fn clock(seconds: f64) -> String {
+    let tenths = (seconds * 10.0).round() as u64;
+    let (minutes, rest) = (tenths / 600, tenths % 600);
+    let (hours, minutes) = (minutes / 60, minutes % 60);
+    if hours > 0 {
+        format!("{hours} h {minutes:02} min {:02} s", rest / 10)
+    } else if minutes > 0 {
+        format!("{minutes} min {:02}.{} s", rest / 10, rest % 10)
+    } else {
+        format!("{}.{} s", rest / 10, rest % 10)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_read_well() {
+        assert_eq!(clock(0.04), "0.0 s");
+        assert_eq!(clock(59.96), "1 min 00.0 s");
+        assert_eq!(clock(3725.0), "1 h 02 min 05 s");
+    }
+}

@@ -1,0 +1,179 @@
+//! What people see on standard error: diagnostics with a window of the file, progress, reports.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::time::Duration;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use drawing::Span;
+use hpgl::{Diagnostic, Severity};
+use indicatif::{ProgressBar, ProgressStyle};
+use plotplan::pipeline::Step;
+
+use crate::input::Input;
+
+/// Bytes shown to either side of a place: files of one line of many megabytes are normal.
+const WINDOW: usize = 48;
+
+/// Prints text to standard error, in colour only where that is wanted. A standard error that is closed is no reason to stop.
+pub(crate) fn say(text: &str) {
+    let mut out = anstream::AutoStream::auto(std::io::stderr());
+    let _ = out.write_all(text.as_bytes());
+    let _ = out.flush();
+}
+
+/// Prints an error.
+pub(crate) fn error(message: &str) {
+    render(&[Group::with_title(Level::ERROR.primary_title(message))]);
+}
+
+/// Prints a warning.
+pub(crate) fn warning(message: &str) {
+    render(&[Group::with_title(Level::WARNING.primary_title(message))]);
+}
+
+fn render(report: &[Group<'_>]) {
+    say(&format!("{}\n", Renderer::styled().render(report)));
+}
+
+/// Prints diagnostics, each with its place in the file.
+pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic]) {
+    for diagnostic in diagnostics {
+        let level = match diagnostic.severity {
+            Severity::Note => Level::NOTE,
+            Severity::Warning => Level::WARNING,
+            Severity::Error => Level::ERROR,
+        };
+        let mut title = diagnostic.message.clone();
+        if diagnostic.count > 1 {
+            title = format!("{title} (and {} more like it)", diagnostic.count - 1);
+        }
+        let place = format!(
+            "byte {}, command {}, pen at {:.2}, {:.2} mm",
+            diagnostic.span.start, diagnostic.command, diagnostic.pen_position.x, diagnostic.pen_position.y
+        );
+        at_place(
+            input,
+            diagnostic.span,
+            level,
+            Some(&diagnostic.code.to_string()),
+            &title,
+            &place,
+            diagnostic.help.as_deref(),
+        );
+    }
+}
+
+/// Prints a message with the window of the file that it is about.
+pub(crate) fn at_place(
+    input: &Input,
+    span: Span,
+    level: Level<'_>,
+    id: Option<&str>,
+    title: &str,
+    place: &str,
+    help: Option<&str>,
+) {
+    let window = Window::around(&input.bytes, span);
+    let title = level.primary_title(title.to_owned());
+    let title = match id {
+        Some(id) => title.id(id.to_owned()),
+        None => title,
+    };
+    let mut group = Group::with_title(title)
+        .element(Origin::path(&input.name).line(window.line).char_column(window.column))
+        .element(
+            Snippet::source(window.text)
+                .line_start(window.line)
+                .annotation(AnnotationKind::Primary.span(window.marked)),
+        )
+        .element(Level::NOTE.message(place));
+    if let Some(help) = help {
+        group = group.element(Level::HELP.message(help));
+    }
+    render(&[group]);
+}
+
+/// A printable piece of a line around a place.
+struct Window {
+    text: String,
+    /// What to mark, in bytes of `text`.
+    marked: std::ops::Range<usize>,
+    /// Line and column of the place in the file, from 1.
+    line: usize,
+    column: usize,
+}
+
+impl Window {
+    fn around(bytes: &[u8], span: Span) -> Self {
+        let start = span.start.min(bytes.len());
+        let is_break = |b: &u8| *b == b'\n' || *b == b'\r';
+        let line_start = bytes[..start].iter().rposition(is_break).map_or(0, |at| at + 1);
+        let line_end = bytes[start..].iter().position(is_break).map_or(bytes.len(), |at| start + at);
+        let from = line_start.max(start.saturating_sub(WINDOW));
+        let marked_end = span.end.clamp(start, line_end);
+        let to = line_end.min(start + WINDOW);
+        let mut text = String::new();
+        if from > line_start {
+            text.push_str("...");
+        }
+        let mut marked = text.len()..text.len();
+        for (offset, byte) in bytes[from..to].iter().enumerate() {
+            if from + offset == start {
+                marked = text.len()..text.len();
+            }
+            // Control codes as their pictures, bytes beyond ASCII as a dot: one column each.
+            match byte {
+                0x20..=0x7E => text.push(char::from(*byte)),
+                0x00..=0x1F => text.push(char::from_u32(0x2400 + u32::from(*byte)).unwrap_or('.')),
+                _ => text.push('\u{b7}'),
+            }
+            if from + offset < marked_end {
+                marked.end = text.len();
+            }
+        }
+        if start >= to {
+            marked = text.len()..text.len();
+        }
+        if to < line_end {
+            text.push_str("...");
+        }
+        let line = bytes[..line_start].iter().filter(|b| **b == b'\n').count() + 1;
+        Self { text, marked, line, column: start - line_start + 1 }
+    }
+}
+
+/// Shows what is being done, on a terminal only and not for the first half second.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    pub(crate) fn new() -> Self {
+        let bar = if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new_spinner();
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+                bar.set_style(style);
+            }
+            bar.enable_steady_tick(Duration::from_millis(500));
+            bar
+        } else {
+            ProgressBar::hidden()
+        };
+        Self { bar }
+    }
+
+    pub(crate) fn step(&self, step: Step) {
+        self.bar.set_message(match step {
+            Step::Placing => "placing the drawing".to_owned(),
+            Step::Ordering => "ordering strokes".to_owned(),
+            Step::Planning => "planning motion".to_owned(),
+            Step::Verifying(done, all) => {
+                format!("verifying {} %", if all > 0 { 100 * done / all } else { 100 })
+            }
+        });
+    }
+
+    pub(crate) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
