@@ -1,0 +1,321 @@
+//! The streamed distances against brute force: dense samples, every pair, nothing clever.
+
+mod common;
+
+use common::{Plotter, arm, cartesian, header, polar};
+use drawing::{Drawing, EllipticArc, Pen, Point, Span, Stroke, Vec2};
+use kinematics::{Joints, Machine};
+use plan::Row;
+use proptest::prelude::*;
+use verify::{Certificate, Deviation, Verifier};
+
+const TOLERANCE: f64 = 0.2;
+/// Spacing of the brute-force samples, mm.
+const STEP: f64 = 0.004;
+
+/// Polylines by pen; a single point is a dot.
+type Lines = Vec<(u16, Vec<Point>)>;
+
+fn point_to_segment(p: Point, a: Point, b: Point) -> f64 {
+    let along = b - a;
+    let t = if along.hypot2() > 0.0 { ((p - a).dot(along) / along.hypot2()).clamp(0.0, 1.0) } else { 0.0 };
+    (p - (a + t * along)).hypot2().sqrt()
+}
+
+fn point_to_lines(p: Point, pen: u16, lines: &Lines) -> f64 {
+    let mut least = f64::INFINITY;
+    for (_, points) in lines.iter().filter(|(other, _)| *other == pen) {
+        least = least.min((p - points[0]).hypot2().sqrt());
+        for pair in points.windows(2) {
+            least = least.min(point_to_segment(p, pair[0], pair[1]));
+        }
+    }
+    least
+}
+
+/// Largest and 99th percentile of the distances from samples of `from` to `to`.
+fn directed(from: &Lines, to: &Lines) -> (f64, f64) {
+    let mut distances = Vec::new();
+    let mut largest = 0.0_f64;
+    for (pen, points) in from {
+        largest = largest.max(point_to_lines(points[0], *pen, to));
+        for pair in points.windows(2) {
+            let length = (pair[1] - pair[0]).hypot2().sqrt();
+            let samples = (length / STEP).ceil() as usize;
+            for k in 0..=samples {
+                let p = pair[0].lerp(pair[1], k as f64 / samples.max(1) as f64);
+                let distance = point_to_lines(p, *pen, to);
+                largest = largest.max(distance);
+                if k > 0 {
+                    distances.push((distance, length / samples as f64));
+                }
+            }
+        }
+    }
+    distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = distances.iter().map(|(_, length)| length).sum();
+    let mut sum = 0.0;
+    let p99 = distances.iter().find(|(_, length)| {
+        sum += length;
+        sum >= 0.99 * total
+    });
+    (largest, p99.map_or(largest, |(distance, _)| *distance))
+}
+
+/// Every row's pen by forward kinematics at `parts` points between each two rows.
+fn replay(machine: &Machine, rows: &[(u16, [f64; 2])], parts: usize) -> Lines {
+    let mut lines: Lines = Vec::new();
+    let mut down = 0;
+    for (index, (pen, ticks)) in rows.iter().enumerate() {
+        if down != 0 {
+            let (_, line) = lines.last_mut().expect("a stroke begun");
+            let before = rows[index - 1].1;
+            for k in 1..=parts {
+                let u = k as f64 / parts as f64;
+                let at = |m: usize| before[m] + u * (ticks[m] - before[m]);
+                line.push(machine.pen_at(&Joints::new(at(0), at(1))));
+            }
+        }
+        if *pen != down && *pen != 0 {
+            lines.push((*pen, vec![machine.pen_at(&Joints::new(ticks[0], ticks[1]))]));
+        }
+        down = *pen;
+    }
+    lines
+}
+
+fn flattened(drawing: &Drawing) -> Lines {
+    drawing.strokes.iter().map(|stroke| (stroke.pen.0, stroke.flatten(1e-6))).collect()
+}
+
+fn certify(machine: &Machine, drawing: &Drawing, rows: &[(u16, [f64; 2])]) -> Certificate {
+    let mut verifier = Verifier::new(machine, drawing, &header(machine), TOLERANCE);
+    for (index, (pen, exact)) in rows.iter().enumerate() {
+        let ticks = exact.map(|ticks| ticks.round() as i64);
+        verifier.row(Row { t_us: 10_000 * index as u64, pen: *pen, ticks }, Some(*exact));
+    }
+    verifier.finish()
+}
+
+/// Never below brute force, and not far above.
+fn compare(found: &Deviation, ink: &Lines, drawing: &Lines, radius: f64) -> Result<(), TestCaseError> {
+    let (strays, strays_p99) = directed(ink, drawing);
+    let spread = found.ink_to_drawing;
+    let slack = 0.5 * STEP + 0.01 * TOLERANCE;
+    prop_assert!(spread.max_mm >= strays - 1e-6, "strays {strays}, found {spread:?}");
+    prop_assert!(spread.max_mm <= strays + slack, "strays {strays}, found {spread:?}");
+    prop_assert!(spread.p99_mm >= strays_p99 - STEP, "p99 {strays_p99}, found {spread:?}");
+    prop_assert!(spread.p99_mm <= spread.max_mm);
+
+    let (missed, missed_p99) = directed(drawing, ink);
+    let spread = found.drawing_to_ink;
+    // Cells are a quarter of the tolerance; a bound is off by half a cell at the most.
+    let slack = 0.5 * STEP + TOLERANCE / 8.0 + 0.01 * TOLERANCE;
+    if spread.more {
+        prop_assert!(missed > radius - slack, "missed {missed}, found {spread:?}");
+    } else {
+        prop_assert!(spread.max_mm >= missed - 1e-6, "missed {missed}, found {spread:?}");
+        prop_assert!(spread.max_mm <= missed + slack, "missed {missed}, found {spread:?}");
+        prop_assert!(spread.p99_mm >= missed_p99 - STEP, "p99 {missed_p99}, found {spread:?}");
+        prop_assert!(
+            spread.p99_mm <= (missed_p99 + slack) * (1.0 + 1.0 / 64.0),
+            "p99 {missed_p99}, {spread:?}"
+        );
+    }
+    Ok(())
+}
+
+fn compare_both(
+    machine: &Machine,
+    drawing: &Drawing,
+    rows: &[(u16, [f64; 2])],
+    parts: usize,
+) -> Result<(), TestCaseError> {
+    let certificate = certify(machine, drawing, rows);
+    let outline = flattened(drawing);
+    let before = certificate.before_rounding.expect("every row came with exact positions");
+    compare(&before, &replay(machine, rows, parts), &outline, 4.0 * TOLERANCE)?;
+    let rounded: Vec<_> = rows.iter().map(|(pen, ticks)| (*pen, ticks.map(f64::round))).collect();
+    let floor = machine.tick_floor(&machine.start());
+    let ink = replay(machine, &rounded, parts);
+    compare(&certificate.after_rounding, &ink, &outline, 4.0 * TOLERANCE + 2.0 * floor)?;
+    let length: f64 = replay(machine, rows, parts)
+        .iter()
+        .flat_map(|(_, points)| points.windows(2))
+        .map(|pair| (pair[1] - pair[0]).hypot2().sqrt())
+        .sum();
+    prop_assert!((certificate.ink_mm - length).abs() <= 0.01 * length + 1e-9);
+    Ok(())
+}
+
+fn point() -> impl Strategy<Value = Point> {
+    (0.0..12.0, 0.0..12.0).prop_map(|(x, y)| Point::new(x, y))
+}
+
+fn stroke() -> impl Strategy<Value = Stroke> {
+    let pen = (1_u16..=2).prop_map(Pen);
+    let span = Span { start: 0, end: 1 };
+    let lines = (pen.clone(), prop::collection::vec(point(), 1..6))
+        .prop_map(move |(pen, points)| Stroke::polyline(pen, points, span).expect("points"));
+    let arc = (pen.clone(), point(), 0.2..4.0, -4.0..4.0, -7.0..7.0, 0.3..1.0).prop_map(
+        move |(pen, center, radius, start, sweep, flat)| {
+            let round = EllipticArc::circular(center, radius, start, sweep);
+            let arc = EllipticArc { b: Vec2::new(0.0, flat * radius), ..round };
+            let mut stroke = Stroke::new(pen, arc.eval(0.0), span);
+            stroke.arc(arc);
+            stroke
+        },
+    );
+    let cubic = (pen, point(), point(), point(), point()).prop_map(move |(pen, a, b, c, d)| {
+        let mut stroke = Stroke::new(pen, a, span);
+        stroke.cubic_to(b, c, d);
+        stroke
+    });
+    prop_oneof![3 => lines, 1 => arc, 1 => cubic]
+}
+
+/// A drawing, and ink that follows it badly: points every so often, each aside by up to `noise`, a stroke left out
+/// now and then.
+fn badly_followed() -> impl Strategy<Value = (Drawing, Lines)> {
+    let noise = prop_oneof![Just(0.0), 0.0..0.05, 0.0..0.6];
+    let step = prop_oneof![0.002..0.05, 0.05..0.8, Just(100.0)];
+    (prop::collection::vec(stroke(), 1..4), noise, step, any::<u64>(), 0..8).prop_map(
+        |(strokes, noise, step, seed, left_out)| {
+            let mut state = seed | 1;
+            let mut random = move || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+            };
+            let mut lines = Lines::new();
+            for (index, stroke) in strokes.iter().enumerate() {
+                if index + 1 == left_out {
+                    continue;
+                }
+                let mut ink = Vec::new();
+                let outline = stroke.flatten(0.01);
+                let mut aside =
+                    |p: Point| ink.push(p + Vec2::new(20.0 + noise * random(), 20.0 + noise * random()));
+                aside(outline[0]);
+                for pair in outline.windows(2) {
+                    let parts =
+                        ((pair[1] - pair[0]).hypot2().sqrt() / step).ceil().clamp(1.0, 500.0) as usize;
+                    (1..=parts).for_each(|k| aside(pair[0].lerp(pair[1], k as f64 / parts as f64)));
+                }
+                lines.push((stroke.pen.0, ink));
+            }
+            let mut drawing = Drawing { strokes };
+            drawing.transform(drawing::Affine::translate((20.0, 20.0)));
+            (drawing, lines)
+        },
+    )
+}
+
+/// Rows through the points, one a period, whatever the motors say to it.
+fn rows_through(machine: &Machine, lines: &Lines) -> Vec<(u16, [f64; 2])> {
+    let mut near = machine.start();
+    let mut ticks = |p: Point| {
+        near = machine.pose_near(p, &near).expect("a point within reach");
+        let exact = machine.ticks(&near);
+        [exact.x, exact.y]
+    };
+    let mut rows = vec![(0, ticks(machine.geometry().forward(&machine.start())))];
+    for (pen, points) in lines {
+        let exact: Vec<_> = points.iter().map(|p| ticks(*p)).collect();
+        rows.push((0, exact[0]));
+        rows.extend(exact.iter().map(|exact| (*pen, *exact)));
+        rows.push((0, exact[exact.len() - 1]));
+    }
+    rows
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(160))]
+
+    #[test]
+    fn as_brute_force_on_a_cartesian_machine((drawing, lines) in badly_followed()) {
+        let machine = cartesian();
+        compare_both(&machine, &drawing, &rows_through(&machine, &lines), 1)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn as_brute_force_on_arms_and_polar_machines((mut drawing, mut lines) in badly_followed(), polar_one: bool) {
+        let (machine, by) = if polar_one { (polar(), (0.0, 10.0)) } else { (arm(), (100.0, 200.0)) };
+        drawing.transform(drawing::Affine::translate(by));
+        lines.iter_mut().flat_map(|(_, points)| points).for_each(|point| *point += Vec2::from(by));
+        // Long steps bow by millimetres: 300 chords keep that below a thousandth.
+        compare_both(&machine, &drawing, &rows_through(&machine, &lines), 300)?;
+    }
+}
+
+/// A corner cut by exactly the tolerance holds, to a thousandth of it: nothing is lost to cells or merging.
+#[test]
+fn the_whole_tolerance_may_be_used() {
+    let machine = cartesian();
+    for turn in [0.05, 0.3, 1.0, 1.57, 2.2, 3.0] {
+        let (sin, cos) = libm::sincos(turn);
+        let corner = Point::new(60.0, 60.0);
+        let (from, to) = (corner - Vec2::new(30.0, 0.0), corner + 30.0 * Vec2::new(cos, sin));
+        let drawing = common::drawing(&[(1, &[(from.x, from.y), (corner.x, corner.y), (to.x, to.y)])]);
+        // The parabola with control points d before, at and d after the corner passes it at d sin(turn / 2) / 2.
+        let cut = 0.5 * (1.0 - 2e-3) * TOLERANCE;
+        let d = (4.0 * cut / libm::sin(0.5 * turn)).min(29.0);
+        let largest = 0.5 * d * libm::sin(0.5 * turn);
+        let (a, c) = (corner - Vec2::new(d, 0.0), corner + d * Vec2::new(cos, sin));
+        for steps in [10, 100, 3000] {
+            let blend = (0..=steps).map(|k| {
+                let u = f64::from(k) / f64::from(steps);
+                a.lerp(corner, u).lerp(corner.lerp(c, u), u)
+            });
+            let points: Vec<Point> = std::iter::once(from).chain(blend).chain([to]).collect();
+            let certificate = certify(&machine, &drawing, &rows_through(&machine, &vec![(1, points)]));
+            let before = certificate.before_rounding.expect("exact positions");
+            let slack = 2e-3 * TOLERANCE;
+            for spread in [before.ink_to_drawing, before.drawing_to_ink] {
+                assert!(
+                    spread.max_mm <= largest + slack,
+                    "turn {turn}, {steps} steps: {largest}, {spread:?}"
+                );
+            }
+            assert!(before.drawing_to_ink.max_mm >= 0.99 * largest, "turn {turn}, {steps} steps: {before:?}");
+        }
+    }
+}
+
+/// Reference figures for seed 1's arm: 0.4536 mm worst (both links together, stretched), 0.186 mm RMS at every pose.
+#[test]
+fn the_tick_floor_of_the_first_arm() {
+    let machine = arm();
+    // Near full stretch (462 mm), where both links' errors add up.
+    let stroke: &[(f64, f64)] = &[(0.0, 461.9), (20.0, 461.4)];
+    let mut plotter = Plotter::new(&machine);
+    let floor = plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).tick_floor;
+    assert!((floor.worst_mm - 0.4536).abs() < 1e-4, "{floor:?}");
+    assert!((floor.rms_mm - 0.186).abs() < 5e-4, "{floor:?}");
+    // In the middle of the sheet the links stand across each other.
+    let stroke: &[(f64, f64)] = &[(100.0, 200.0), (120.0, 220.0)];
+    let mut plotter = Plotter::new(&machine);
+    let floor = plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).tick_floor;
+    assert!(floor.worst_mm > 0.3 && floor.worst_mm < 0.43, "{floor:?}");
+    assert!((floor.rms_mm - 0.186).abs() < 5e-4, "{floor:?}");
+}
+
+/// Metres-long strokes by the thousand: cells are capped, the certificate says what it did not see.
+#[test]
+fn a_drawing_of_hundreds_of_kilometres_is_sampled() {
+    let machine = cartesian();
+    let strokes = (0..2000).filter_map(|k| {
+        let y = f64::from(k % 200);
+        let points = vec![Point::new(0.0, y), Point::new(2e5, y)];
+        Stroke::polyline(Pen(1), points, Span::default())
+    });
+    let drawing = Drawing { strokes: strokes.collect() };
+    let rows = [(0, [0.0, 0.0]), (0, [0.0, 0.0]), (1, [0.0, 0.0]), (1, [5000.0, 0.0]), (0, [5000.0, 0.0])];
+    let certificate = certify(&machine, &drawing, &rows);
+    let spread = certificate.after_rounding.drawing_to_ink;
+    assert!(spread.more && spread.unseen_mm > 5.0, "{spread:?}");
+    assert!(certificate.after_rounding.ink_to_drawing.max_mm < 1e-9);
+}
