@@ -11,6 +11,9 @@ const CELL: f64 = 1.0 / 4.0;
 /// No more cells than this (and one a piece): from there on they grow, and only their middles are looked at.
 const MAX_CELLS: f64 = (1_u32 << 24) as f64;
 
+/// How many cells of a piece are looked at together.
+pub(crate) const BLOCK: usize = 16;
+
 /// How many children a box of the tree has.
 const FAN: usize = 8;
 
@@ -28,6 +31,8 @@ pub(crate) struct Piece {
     pub(crate) first_cell: u32,
     /// How many equal cells it is divided into; at least 1.
     pub(crate) cells: u32,
+    /// Index of its first block of [`BLOCK`] cells.
+    pub(crate) first_block: u32,
     /// Index of its stroke in the drawing.
     pub(crate) stroke: u32,
 }
@@ -37,7 +42,7 @@ impl Piece {
         let vector = end - start;
         let length = libm::hypot(vector.x, vector.y);
         let along = if length > 0.0 { vector / length } else { Vec2::new(1.0, 0.0) };
-        Self { start, along, length, error, first_cell: 0, cells: 1, stroke: stroke as u32 }
+        Self { start, along, length, error, first_cell: 0, cells: 1, first_block: 0, stroke: stroke as u32 }
     }
 
     /// `p` in the piece's frame: how far along it, and how far to its left.
@@ -106,8 +111,8 @@ impl PenTarget {
         Self { pen, pieces, levels }
     }
 
-    /// Calls `to` with the index of every piece whose box meets `bounds`.
-    pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32)) {
+    /// Calls `to` with the index and the box of every piece whose box meets `bounds`.
+    pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32, Rect)) {
         let mut open = vec![(self.levels.len() - 1, 0)];
         while let Some((level, index)) = open.pop() {
             if !meet(self.levels[level][index], bounds) {
@@ -120,8 +125,9 @@ impl PenTarget {
                 );
             } else {
                 for i in children.take_while(|i| *i < self.pieces.len()) {
-                    if meet(self.pieces[i].bounds(), bounds) {
-                        to(i as u32);
+                    let piece = self.pieces[i].bounds();
+                    if meet(piece, bounds) {
+                        to(i as u32, piece);
                     }
                 }
             }
@@ -183,6 +189,8 @@ pub(crate) struct Target {
     pub(crate) sources: Vec<Span>,
     /// How many cells there are in all.
     pub(crate) cells: usize,
+    /// How many blocks of cells.
+    pub(crate) blocks: usize,
     /// Longest cell, if only their middles are looked at; otherwise 0.
     pub(crate) sparse_mm: f64,
     /// Strokes with coordinates that are not finite.
@@ -226,16 +234,19 @@ impl Target {
             .filter(|(_, pieces)| !pieces.is_empty())
             .map(|(pen, pieces)| PenTarget::new(pen, pieces))
             .collect();
-        let mut cells = 0;
+        let (mut cells, mut blocks) = (0, 0);
         for piece in pens.iter_mut().flat_map(|pen| &mut pen.pieces) {
             piece.first_cell = cells;
             piece.cells = (piece.length / cell).ceil().max(1.0) as u32;
             cells += piece.cells;
+            piece.first_block = blocks;
+            blocks += piece.cells.div_ceil(BLOCK as u32);
         }
         Self {
             pens,
             sources: drawing.strokes.iter().map(|stroke| stroke.source).collect(),
             cells: cells as usize,
+            blocks: blocks as usize,
             sparse_mm: if sparse { cell } else { 0.0 },
             broken,
         }

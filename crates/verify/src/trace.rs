@@ -12,21 +12,24 @@
 //! A cell that lies beside the joint `v` of two consecutive runs is divided at `m`, the point nearest to `v`: one run
 //! answers for each half.
 
+use std::ops::Range;
+
 use drawing::{Point, Rect, Vec2};
 
 use crate::{
     Place, Spread,
     histogram::Histogram,
-    target::{PenTarget, Piece, Target},
+    target::{BLOCK, PenTarget, Piece, Target, meet},
 };
 
 /// Chords are merged into a run that stays within this share of the tolerance of each of them.
 const MERGE: f64 = 1.0 / 5000.0;
 /// No run is merged beyond so many tolerances.
 const LONGEST_RUN: f64 = 10.0;
-/// A bound on the ink's distance is tight enough if it is above the value at the ends by this share of the tolerance,
-const TIGHT: f64 = 1.0 / 200.0;
-/// or, where it would be the largest so far, by this one.
+/// A bound on the ink's distance is tight enough if it is above the value at the ends by this share of the tolerance
+/// or of itself, whichever is more,
+const TIGHT: (f64, f64) = (1.0 / 200.0, 1.0 / 32.0);
+/// or, where it would be the largest so far, by this share of the tolerance.
 const TIGHTEST: f64 = 1.0 / 5000.0;
 /// A run is not halved more often than this.
 const HALVINGS: u32 = 24;
@@ -95,13 +98,16 @@ pub(crate) struct Trace {
     /// Cells further than this from a run are not touched by it.
     radius: f64,
     smallest_radius: f64,
-    /// Bound on each cell's distance from the ink, mm; infinite where no ink came near.
-    covered: Vec<f32>,
+    cover: Cover,
     pen: usize,
     chain: Option<Chain>,
-    /// Pieces of this pen that meet `near_bounds`.
-    near: Vec<u32>,
+    /// Pieces of this pen that meet `near_bounds`, with their boxes.
+    near: Vec<(u32, Rect)>,
     near_bounds: Option<Rect>,
+    /// How much further than the radius `near_bounds` reaches.
+    margin: f64,
+    /// Working memory of [`Near::bound`]: distances of pieces, and which.
+    candidates: Vec<(f64, u32)>,
     distances: Histogram,
     worst: Option<Worst>,
     pub(crate) length: f64,
@@ -115,11 +121,13 @@ impl Trace {
             merge: tolerance * MERGE,
             radius: 0.0,
             smallest_radius: 0.0,
-            covered: vec![f32::INFINITY; target.cells],
+            cover: Cover::new(target),
             pen: 0,
             chain: None,
             near: Vec::new(),
             near_bounds: None,
+            margin: tolerance,
+            candidates: Vec::new(),
             distances: Histogram::new(),
             worst: None,
             length: 0.0,
@@ -189,7 +197,12 @@ impl Trace {
         let mut nearest = [(f64::INFINITY, 0_u32); 2];
         // The distances of the run's ends from one piece: the one for which the larger is the least.
         let mut common = [f64::INFINITY; 2];
-        for &index in &self.near {
+        self.candidates.clear();
+        for &(index, piece_bounds) in &self.near {
+            if !meet(piece_bounds, bounds) {
+                continue;
+            }
+            self.candidates.push((0.0, index));
             let piece = &strokes.pieces[index as usize];
             let local = LocalRun::new(piece, &run);
             let distances = local.ends.map(|end| piece.distance(end));
@@ -199,13 +212,9 @@ impl Trace {
                 }
             }
             common = better(common, distances);
-            if target.sparse_mm > 0.0 {
-                local.cover_middles(piece, self.radius, &mut self.covered);
-            } else {
-                local.cover(piece, self.radius, &mut self.covered);
-                if let Some(before) = &before {
-                    LocalRun::new(piece, before).cover_joint(&local, piece, self.radius, &mut self.covered);
-                }
+            self.cover.run(piece, &local, self.radius);
+            if let Some(before) = &before {
+                self.cover.joint(piece, &LocalRun::new(piece, before), &local, self.radius);
             }
         }
         // Beyond the radius the list may not hold the nearest piece.
@@ -219,16 +228,17 @@ impl Trace {
         let length = distance(run.from, run.to);
         self.length += length;
         let ends = [(run.from, nearest[0].0), (run.to, nearest[1].0)];
-        let near = Near {
+        let mut near = Near {
             strokes,
-            indices: &self.near,
+            candidates: &mut self.candidates,
             radius: self.radius,
             tolerance: self.tolerance,
             largest: self.worst.map_or(0.0, |worst| worst.mm - run.error),
         };
         let distances = &mut self.distances;
         let mut largest = 0.0_f64;
-        near.bound(ends, common, HALVINGS, &mut |[from, to], length| {
+        let all = 0..near.candidates.len();
+        near.bound(all, ends, common, HALVINGS, &mut |[from, to], length| {
             largest = largest.max(from.max(to) + run.error);
             // Along the run the distance is at most what evenly leads from the one end's to the other's.
             let steps = ((from - to).abs() / (0.1 * largest + 1e-12)).ceil().clamp(1.0, 8.0);
@@ -257,9 +267,15 @@ impl Trace {
         if self.near_bounds.is_some_and(holds) {
             return;
         }
-        let wider = bounds.inflate(2.0 * self.radius, 2.0 * self.radius);
+        // Few pieces to look through again and again, but not few runs for which they last.
+        match self.near.len() {
+            0..16 => self.margin = (2.0 * self.margin).min(4.0 * self.radius),
+            16..48 => {}
+            _ => self.margin = (0.5 * self.margin).max(self.radius / 16.0),
+        }
+        let wider = bounds.inflate(self.margin, self.margin);
         self.near.clear();
-        target.pens[self.pen].visit(wider, |index| self.near.push(index));
+        target.pens[self.pen].visit(wider, |index, piece| self.near.push((index, piece)));
         self.near_bounds = Some(wider);
     }
 
@@ -295,7 +311,9 @@ impl Trace {
             for piece in &strokes.pieces {
                 let cell = piece.length / f64::from(piece.cells);
                 let first = piece.first_cell as usize;
-                for (index, covered) in self.covered[first..first + piece.cells as usize].iter().enumerate() {
+                for (index, covered) in
+                    self.cover.cells[first..first + piece.cells as usize].iter().enumerate()
+                {
                     let unknown = *covered == f32::INFINITY;
                     let mm = if unknown { self.smallest_radius } else { f64::from(*covered) };
                     distances.add(mm, cell);
@@ -413,50 +431,74 @@ impl LocalRun {
         let (x, y) = (x - t * self.vector.0, y - t * self.vector.1);
         x * x + y * y
     }
+}
 
-    /// The cells that may be within `radius` of the run.
-    fn range(&self, piece: &Piece, radius: f64) -> std::ops::Range<usize> {
-        let [(x0, y0), (x1, y1)] = self.ends;
-        let (low, high) = (x0.min(x1) - radius, x0.max(x1) + radius);
-        if high < 0.0 || low > piece.length || y0.min(y1) > radius || y0.max(y1) < -radius {
-            return 0..0;
+/// How well the ink covers each cell of the drawing.
+#[derive(Clone, Debug)]
+struct Cover {
+    /// Bound on each cell's distance from the ink, mm; infinite where no ink came near.
+    cells: Vec<f32>,
+    /// The largest of each block.
+    blocks: Vec<f32>,
+    /// Whether only the cells' middles are looked at.
+    sparse: bool,
+}
+
+impl Cover {
+    fn new(target: &Target) -> Self {
+        Self {
+            cells: vec![f32::INFINITY; target.cells],
+            blocks: vec![f32::INFINITY; target.blocks],
+            sparse: target.sparse_mm > 0.0,
         }
-        if piece.length == 0.0 {
-            return 0..1;
-        }
-        let per_mm = f64::from(piece.cells) / piece.length;
-        let first = (low * per_mm).floor().max(0.0) as usize;
-        first..((high * per_mm).ceil() as usize).min(piece.cells as usize)
     }
 
-    /// Notes how well the run covers each cell near it.
-    fn cover(&self, piece: &Piece, radius: f64, covered: &mut [f32]) {
-        let range = self.range(piece, radius);
-        if range.is_empty() {
+    /// Notes how well a run covers the cells of a piece.
+    fn run(&mut self, piece: &Piece, run: &LocalRun, radius: f64) {
+        let [(x0, y0), (x1, y1)] = run.ends;
+        let (low, high) = (x0.min(x1), x0.max(x1));
+        // The run is nowhere nearer to the piece's line than this.
+        let aside = y0.min(y1).max(-y0.max(y1)).max(0.0);
+        if high + radius < 0.0 || low - radius > piece.length || aside > radius {
             return;
         }
+        let count = piece.cells as usize;
         let cell = piece.length / f64::from(piece.cells);
-        let mut at_start = self.square_at(range.start as f64 * cell);
-        let first = piece.first_cell as usize;
-        let cells = &mut covered[first + range.start..first + range.end];
-        for (index, covered) in (range.start + 1..).zip(cells) {
-            let at_end = self.square_at(index as f64 * cell);
-            keep(covered, at_start.max(at_end), self.error, radius);
-            at_start = at_end;
+        let (first, last) = if piece.length > 0.0 {
+            let first = ((low - radius) / cell).floor().max(0.0) as usize;
+            (first / BLOCK, (((high + radius) / cell).ceil() as usize).min(count).div_ceil(BLOCK))
+        } else {
+            (0, 1)
+        };
+        for block in first..last {
+            let from = block * BLOCK;
+            let to = (from + BLOCK).min(count);
+            let (start, end) = (from as f64 * cell, to as f64 * cell);
+            let beyond = (low - end).max(start - high).max(0.0);
+            let worst = &mut self.blocks[piece.first_block as usize + block];
+            // No cell of the block can get nearer than it is.
+            if f64::from(*worst) * f64::from(*worst) <= aside * aside + beyond * beyond {
+                continue;
+            }
+            let at = piece.first_cell as usize;
+            let cells = &mut self.cells[at + from..at + to];
+            let mut squares = [0.0; BLOCK + 1];
+            let offset = if self.sparse { 0.5 } else { 0.0 };
+            for (index, square) in squares[..=cells.len()].iter_mut().enumerate() {
+                *square = run.square_at(((from + index) as f64 + offset) * cell);
+            }
+            let mut largest = 0.0_f32;
+            for (index, covered) in cells.iter_mut().enumerate() {
+                let next = if self.sparse { 0.0 } else { squares[index + 1] };
+                *covered = covered.min(bound(squares[index].max(next), run.error, radius));
+                largest = largest.max(*covered);
+            }
+            *worst = largest;
         }
     }
 
-    /// As [`Self::cover`], but only for the middle of each cell.
-    fn cover_middles(&self, piece: &Piece, radius: f64, covered: &mut [f32]) {
-        let cell = piece.length / f64::from(piece.cells);
-        for index in self.range(piece, radius) {
-            let square = self.square_at((index as f64 + 0.5) * cell);
-            keep(&mut covered[piece.first_cell as usize + index], square, self.error, radius);
-        }
-    }
-
-    /// Notes how well this run and the `next`, which begins where it ends, together cover the cell beside their joint.
-    fn cover_joint(&self, next: &Self, piece: &Piece, radius: f64, covered: &mut [f32]) {
+    /// Notes how well two consecutive runs together cover the cell beside their joint.
+    fn joint(&mut self, piece: &Piece, before: &LocalRun, next: &LocalRun, radius: f64) {
         let (along, across) = next.ends[0];
         let middle = along.clamp(0.0, piece.length);
         let joint = (along - middle) * (along - middle) + across * across;
@@ -464,31 +506,30 @@ impl LocalRun {
             return;
         }
         let cell = piece.length / f64::from(piece.cells);
-        let last = f64::from(piece.cells - 1);
-        let index = if cell > 0.0 { (middle / cell).floor().clamp(0.0, last) } else { 0.0 };
-        let (start, end) = (index * cell, (index + 1.0) * cell);
-        let square = (self.square_at(start).max(next.square_at(end)))
-            .min(next.square_at(start).max(self.square_at(end)))
+        let index = if cell > 0.0 { ((middle / cell) as usize).min(piece.cells as usize - 1) } else { 0 };
+        let covered = &mut self.cells[piece.first_cell as usize + index];
+        if self.sparse || f64::from(*covered) * f64::from(*covered) <= joint {
+            return;
+        }
+        let (start, end) = (index as f64 * cell, (index + 1) as f64 * cell);
+        let square = (before.square_at(start).max(next.square_at(end)))
+            .min(next.square_at(start).max(before.square_at(end)))
             .max(joint);
-        let covered = &mut covered[piece.first_cell as usize + index as usize];
-        keep(covered, square, self.error.max(next.error), radius);
+        *covered = covered.min(bound(square, before.error.max(next.error), radius));
     }
 }
 
-/// Keeps the smaller distance, never rounded down.
-fn keep(covered: &mut f32, square: f64, error: f64, radius: f64) {
+/// A distance as it is kept: never rounded down, and only up to the radius.
+fn bound(square: f64, error: f64, radius: f64) -> f32 {
     let mm = square.sqrt() + error;
-    let rounded = (mm * (1.0 + f64::from(f32::EPSILON))) as f32;
-    if mm <= radius && rounded < *covered {
-        *covered = rounded;
-    }
+    if mm <= radius { (mm * (1.0 + f64::from(f32::EPSILON))) as f32 } else { f32::INFINITY }
 }
 
 /// The pieces about a run.
 struct Near<'a> {
     strokes: &'a PenTarget,
-    /// All pieces within `radius` of the run, and some more.
-    indices: &'a [u32],
+    /// At first all pieces within `radius` of the run; then, behind them, those that matter to a part of it.
+    candidates: &'a mut Vec<(f64, u32)>,
     radius: f64,
     tolerance: f64,
     /// What is no larger than this need not be known so well.
@@ -498,9 +539,10 @@ struct Near<'a> {
 impl Near<'_> {
     /// Hands on bounds of the distance along the run between two points whose own distances are known: a bound at
     /// either end, between which the distance stays below the even slope, and the length they hold for. `common`
-    /// are the distances of both points from one piece.
+    /// are the distances of both points from one piece; `among` are the candidates.
     fn bound(
-        &self,
+        &mut self,
+        among: Range<usize>,
         ends: [(Point, f64); 2],
         common: [f64; 2],
         halvings: u32,
@@ -512,31 +554,47 @@ impl Near<'_> {
         let rise = 0.5 * (at_from + at_end + length);
         let common = better(common, [rise, rise]);
         let bound = common[0].max(common[1]);
-        let slack = if bound <= self.largest { TIGHT } else { TIGHTEST } * self.tolerance;
+        let slack = if bound <= self.largest {
+            (TIGHT.0 * self.tolerance).max(TIGHT.1 * bound)
+        } else {
+            TIGHTEST * self.tolerance
+        };
         if bound <= at_from.max(at_end) + slack || halvings == 0 {
             to(common, length);
             return;
         }
         let middle = from.midpoint(end);
-        let mut at_middle = f64::INFINITY;
-        let mut halves = [[f64::INFINITY; 2]; 2];
-        let mut consider = |piece: &Piece| {
+        let first = self.candidates.len();
+        let mut nearest = f64::INFINITY;
+        for candidate in among {
+            let index = self.candidates[candidate].1;
+            let piece = &self.strokes.pieces[index as usize];
             let here = piece.distance(piece.local(middle));
-            at_middle = at_middle.min(here);
-            if here < halves[0][0].max(halves[0][1]) || here < halves[1][0].max(halves[1][1]) {
-                let [at_from, at_end] = piece.distances([from, end]);
-                halves = [better(halves[0], [at_from, here]), better(halves[1], [here, at_end])];
-            }
-            here
-        };
-        let nearest = self.indices.iter().fold(f64::INFINITY, |nearest, &index| {
-            nearest.min(consider(&self.strokes.pieces[index as usize]))
-        });
-        if nearest > self.radius {
-            consider(&self.strokes.pieces[self.strokes.nearest(middle).1 as usize]);
+            nearest = nearest.min(here);
+            self.candidates.push((here, index));
         }
-        self.bound([ends[0], (middle, at_middle)], halves[0], halvings - 1, to);
-        self.bound([(middle, at_middle), ends[1]], halves[1], halvings - 1, to);
+        if nearest > self.radius {
+            let found = self.strokes.nearest(middle);
+            nearest = found.0;
+            self.candidates.push(found);
+        }
+        // Half the length away a piece can be nearer by that, and the nearest one further.
+        let mut kept = first;
+        let mut halves = [[f64::INFINITY; 2]; 2];
+        for candidate in first..self.candidates.len() {
+            let (here, index) = self.candidates[candidate];
+            if here > nearest + length {
+                continue;
+            }
+            self.candidates[kept] = (here, index);
+            kept += 1;
+            let [at_from, at_end] = self.strokes.pieces[index as usize].distances([from, end]);
+            halves = [better(halves[0], [at_from, here]), better(halves[1], [here, at_end])];
+        }
+        self.candidates.truncate(kept);
+        self.bound(first..kept, [ends[0], (middle, nearest)], halves[0], halvings - 1, to);
+        self.bound(first..kept, [(middle, nearest), ends[1]], halves[1], halvings - 1, to);
+        self.candidates.truncate(first);
     }
 }
 

@@ -1,0 +1,118 @@
+//! Rows a second through the verifier: `cargo run --release -p verify --example throughput`.
+//!
+//! The plans run through the drawing's points at an even speed; what the motors would say to that is no matter here.
+
+#![expect(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a benchmark reads the clock and prints"
+)]
+
+use std::time::Instant;
+
+use drawing::{Drawing, Pen, Point, Span, Stroke, Vec2};
+use kinematics::{Geometry, Joints, Machine, MachineParts, TwoLink};
+use plan::Row;
+use verify::Verifier;
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+/// Lines across a sheet of 160 mm, wavy with the given number of vertices each.
+fn sheet(lines: u32, vertices: u32, wave: f64) -> Drawing {
+    let strokes = (0..lines).filter_map(|line| {
+        let y = 20.0 + 160.0 * f64::from(line) / f64::from(lines);
+        let points = (0..=vertices).map(|k| {
+            let u = f64::from(if line % 2 == 0 { k } else { vertices - k }) / f64::from(vertices);
+            Point::new(20.0 + 160.0 * u, y + wave * libm::sin(300.0 * u))
+        });
+        Stroke::polyline(Pen(1), points.collect(), Span::default())
+    });
+    Drawing { strokes: strokes.collect() }
+}
+
+/// Rows along the strokes, `step` mm apart.
+fn rows(machine: &Machine, drawing: &Drawing, step: f64, period_us: u64) -> Vec<(Row, [f64; 2])> {
+    let mut rows = Vec::new();
+    let mut near = machine.start();
+    let mut push = |pen: u16, point: Point| {
+        if let Ok(pose) = machine.pose_near(point, &near) {
+            near = pose;
+            let exact = machine.ticks(&pose);
+            let row = Row {
+                t_us: period_us * rows.len() as u64,
+                pen,
+                ticks: [exact.x.round() as i64, exact.y.round() as i64],
+            };
+            rows.push((row, [exact.x, exact.y]));
+        }
+    };
+    push(0, machine.geometry().forward(&machine.start()));
+    for stroke in &drawing.strokes {
+        push(0, stroke.start());
+        let mut left = 0.0;
+        for pair in stroke.vertices().windows(2) {
+            let along: Vec2 = pair[1] - pair[0];
+            let length = along.hypot2().sqrt();
+            while left < length {
+                push(1, pair[0] + along * (left / length));
+                left += step;
+            }
+            left -= length;
+        }
+        push(0, stroke.end());
+    }
+    rows
+}
+
+fn measure(name: &str, machine: &Machine, drawing: &Drawing, step: f64, period_us: u64, exact: bool) {
+    let rows = rows(machine, drawing, step, period_us);
+    let header = plan::Header { period_us, ..common::header(machine) };
+    let began = Instant::now();
+    let mut verifier = Verifier::new(machine, drawing, &header, 0.1);
+    let built = began.elapsed();
+    for (row, position) in &rows {
+        verifier.row(*row, exact.then_some(*position));
+    }
+    let certificate = verifier.finish();
+    let seconds = began.elapsed().as_secs_f64();
+    println!(
+        "{name:34} {:>8} rows {:>7.2} Mrows/s  build {:>6.1} ms  before {:.4} after {:.4} mm",
+        rows.len(),
+        rows.len() as f64 / seconds * 1e-6,
+        built.as_secs_f64() * 1e3,
+        certificate.before_rounding.unwrap_or_default().max_mm(),
+        certificate.after_rounding.max_mm(),
+    );
+}
+
+/// Seed 1's arm with fine encoders, over the same sheet.
+fn fine_arm() -> Option<Machine> {
+    let coarse = common::arm();
+    let mut parts: MachineParts = coarse.parts().clone();
+    parts.geometry = Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true });
+    parts.motors.iter_mut().for_each(|motor| motor.counts *= 100.0);
+    parts.start = Joints::new(1.0, 0.5);
+    Machine::new(parts).ok()
+}
+
+fn main() {
+    let lines = sheet(400, 1, 0.0);
+    let waves = sheet(325, 400, 0.5);
+    let dense = sheet(130, 10_000, 0.5);
+    let cartesian = common::cartesian();
+    for (name, drawing) in
+        [("lines", &lines), ("waves, 130 k vertices", &waves), ("waves, 1.3 M vertices", &dense)]
+    {
+        measure(&format!("cartesian, 10 ms, {name}"), &cartesian, drawing, 0.5, 10_000, true);
+        measure(&format!("cartesian, 1 ms, {name}"), &cartesian, drawing, 0.05, 1_000, true);
+    }
+    measure("cartesian, 1 ms, ticks only, waves", &cartesian, &waves, 0.05, 1_000, false);
+    if let Some(arm) = fine_arm() {
+        measure("arm, 10 ms, waves", &arm, &waves, 0.5, 10_000, true);
+        measure("arm, 1 ms, waves", &arm, &waves, 0.05, 1_000, true);
+    }
+    let coarse = common::arm();
+    measure("coarse arm, 10 ms, waves", &coarse, &waves, 0.5, 10_000, true);
+    measure("coarse arm, 1 ms, waves", &coarse, &waves, 0.05, 1_000, true);
+}
