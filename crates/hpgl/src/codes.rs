@@ -89,14 +89,13 @@ codes! {
         "The file draws before any SP selects a pen. A plotter without a pen draws nothing; what is meant is the pen \
          that is in the holder, so that pen 1 is taken."
     PEN_PUT_AWAY = 202 "H0202" Warning "drawing without a pen"
-        "SP0 (or SP without a number) puts the pen away; pen-down moves after it leave no ink, as on a plotter."
+        "SP0 (or SP without a number) puts the pen away; pen-down moves after it leave no ink, as on a plotter. If a \
+         file draws nothing else at all, see H0222."
     BAD_PARAMETERS = 203 "H0203" Warning "wrong parameters"
         "The command's parameters are too few, or not what it allows. It has no effect."
     LOST_DRAWING_COMMAND = 204 "H0204" Error "drawing command with wrong parameters"
         "A command that draws has too few parameters, or some that it does not allow. It is skipped, and its ink is \
          missing."
-    EXTRA_PARAMETERS = 205 "H0205" Note "too many parameters"
-        "The command takes fewer parameters than it has. Those at the end are passed over."
     ODD_COORDINATES = 206 "H0206" Warning "odd number of coordinates"
         "A coordinate list has an x without its y at the end. That x is passed over."
     COORDINATE_OUT_OF_RANGE = 207 "H0207" Error "coordinate beyond all paper"
@@ -128,13 +127,13 @@ codes! {
          drawn by itself."
     EMPTY_POLYGON = 218 "H0218" Note "empty polygon"
         "EP or FP asks for a polygon, but the polygon buffer holds none."
-    CLOSE_TO_NO_MEANING = 219 "H0219" Note "command without effect on ink"
-        "The command is known and changes nothing that a pen draws here: colour, transparency, raster fills, fonts of \
-         the printer. It is passed over."
     LABEL_NOT_DRAWN = 220 "H0220" Error "label not drawn"
         "The text of a label is not drawn."
     FILL_NOT_DRAWN = 221 "H0221" Error "fill not drawn"
         "An area is filled by this command. Only its outline is drawn."
+    ONLY_INK_WITHOUT_PEN = 222 "H0222" Warning "drawing without a pen throughout"
+        "The file puts the pen away (SP0) and then draws all that it draws. On a plotter with pens in a carousel the \
+         sheet would stay empty; what is meant is a pen that somebody put into the holder, so that pen 1 is taken."
 }
 
 #[cfg(test)]

@@ -161,8 +161,15 @@ impl Findings {
         }
     }
 
-    pub(crate) fn as_slice(&self) -> &[Diagnostic] {
-        &self.found
+    /// Makes all findings of one code a single one of another, at their first place.
+    pub(crate) fn recode(&mut self, from: Code, to: Code, message: impl FnOnce() -> String) {
+        let Some(first) = self.found.iter().position(|diagnostic| diagnostic.code == from) else { return };
+        let count = self.found.iter().filter(|diagnostic| diagnostic.code == from).map(|d| d.count).sum();
+        let diagnostic = &mut self.found[first];
+        *diagnostic =
+            Diagnostic { code: to, severity: to.severity(), message: message(), count, ..diagnostic.clone() };
+        self.found.retain(|diagnostic| diagnostic.code != from);
+        self.by_kind.clear();
     }
 
     pub(crate) fn into_vec(self) -> Vec<Diagnostic> {

@@ -46,9 +46,12 @@ fn byte_at(bytes: &[u8], at: usize, reencoded: bool) -> Option<(u8, usize)> {
 /// command look like the beginning of a number: then the data end after their last whole number. `is_reencoded` is
 /// asked at the first byte pair that could be one byte re-encoded as UTF-8.
 pub(crate) fn scan(bytes: &[u8], mut is_reencoded: impl FnMut() -> bool) -> usize {
+    // Longer than any number: its digits hold more than 64 bits.
+    const TOO_LONG: usize = 64;
     let mut at = 0;
-    // After the last whole number or flag.
+    // After the last whole number or flag, and how many digits there were since.
     let mut whole = 0;
+    let mut digits = 0;
     let mut base32 = false;
     let mut reencoded = None;
     while let Some(&raw) = bytes.get(at) {
@@ -59,14 +62,17 @@ pub(crate) fn scan(bytes: &[u8], mut is_reencoded: impl FnMut() -> bool) -> usiz
         match kind(byte) {
             Kind::Digit => {
                 at += length;
+                digits += 1;
                 if if base32 { (95..=126).contains(&byte) } else { byte >= 191 } {
-                    whole = at;
+                    (whole, digits) = (at, 0);
+                } else if digits == TOO_LONG {
+                    break;
                 }
             }
             Kind::Flag => {
                 base32 |= byte & 0x7f == b'7';
                 at += length;
-                whole = at;
+                (whole, digits) = (at, 0);
             }
             Kind::Passed => at += length,
             Kind::End => match envelope::device_control(&bytes[at..]) {

@@ -117,7 +117,8 @@ impl Interpreter {
             for segment in path {
                 self.polygon.segment(segment.transformed(map), self.down);
             }
-        } else if self.down && self.ink() {
+        } else if self.down {
+            self.ink();
             for segment in path {
                 self.tracer.segment(&segment.transformed(map));
             }
@@ -166,7 +167,7 @@ impl Interpreter {
         match *p {
             [xi, yi, xe, ye] => self.arc_through(Point::new(xi, yi), Point::new(xe, ye), None),
             [xi, yi, xe, ye, chord, ..] => {
-                self.arc_through(Point::new(xi, yi), Point::new(xe, ye), Some(chord))
+                self.arc_through(Point::new(xi, yi), Point::new(xe, ye), Some(chord));
             }
             _ => self.lost("two points"),
         }
@@ -195,7 +196,8 @@ impl Interpreter {
         };
         if start == inter && inter == end {
             none(self);
-            if self.down && !self.polygon.is_open() && self.ink() {
+            if self.down && !self.polygon.is_open() {
+                self.ink();
                 self.tracer.line(self.position_mm, self.position_mm);
             }
         } else if start == end {
@@ -256,7 +258,8 @@ impl Interpreter {
 
     /// Draws a closed path in current units around the pen, which stays where it is and as it is.
     fn edge(&mut self, path: &[Segment]) {
-        if self.is_sane_path(path) && self.ink() {
+        if self.is_sane_path(path) {
+            self.ink();
             let map = self.frame.user_to_mm();
             self.tracer.finish();
             for segment in path {
@@ -281,7 +284,8 @@ impl Interpreter {
         };
         let center = self.user_position();
         if radius == 0.0 {
-            if !self.polygon.is_open() && self.ink() {
+            if !self.polygon.is_open() {
+                self.ink();
                 self.tracer.dot(self.position_mm);
             }
             return;

@@ -303,7 +303,7 @@ impl Frame {
     pub(crate) fn set_window(&mut self, corners: Option<(Point, Point)>) {
         self.window = corners.map(|(a, b)| Window {
             plu: Rect::from_points(self.plu_of_user(a), self.plu_of_user(b)),
-            user: self.scale.is_some().then(|| Rect { x0: a.x, y0: a.y, x1: b.x, y1: b.y }),
+            user: self.scale.is_some().then_some(Rect { x0: a.x, y0: a.y, x1: b.x, y1: b.y }),
         });
     }
 

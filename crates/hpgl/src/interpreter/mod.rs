@@ -186,29 +186,24 @@ impl Interpreter {
         }
     }
 
-    /// The pen that draws, or nothing where there is none; either way it is told.
-    fn ink(&mut self) -> bool {
+    /// To be called before ink: sees to it that there is a pen, and tells where that is not what the file says.
+    fn ink(&mut self) {
         match self.holder {
-            Holder::Holds(_) => true,
+            Holder::Holds(_) => {}
             Holder::Unsaid => {
                 self.report(codes::NO_PEN_SELECTED, || "no SP has selected a pen: pen 1 is taken".into());
                 self.hold(1);
-                true
             }
+            // Kept as ink of pen 0 until the end of the file tells whether there is any other.
             Holder::Empty => {
                 self.report(codes::PEN_PUT_AWAY, || "the pen is put away (SP0): nothing is drawn".into());
-                false
             }
         }
     }
 
     fn hold(&mut self, pen: u16) {
         self.holder = if pen == 0 { Holder::Empty } else { Holder::Holds(pen) };
-        if pen == 0 {
-            self.tracer.finish();
-        } else {
-            self.tracer.set_pen(Pen(pen));
-        }
+        self.tracer.set_pen(Pen(pen));
     }
 
     /// Puts the pen at a place without drawing.
@@ -232,6 +227,27 @@ impl Interpreter {
         sane
     }
 
+    /// Ink that was drawn after `SP0` is none, unless there is no other in the whole file: then a pen in the holder is
+    /// meant.
+    fn settle_ink_of_no_pen(&mut self) {
+        let strokes = || self.pages.iter().flat_map(|page| &page.drawing.strokes);
+        if strokes().all(|stroke| stroke.pen == Pen(0)) {
+            if strokes().next().is_some() {
+                self.findings.recode(codes::PEN_PUT_AWAY, codes::ONLY_INK_WITHOUT_PEN, || {
+                    "all drawing is done with the pen put away (SP0): pen 1 is taken".into()
+                });
+            }
+            for stroke in self.pages.iter_mut().flat_map(|page| &mut page.drawing.strokes) {
+                stroke.pen = Pen(1);
+            }
+            return;
+        }
+        for page in &mut self.pages {
+            page.drawing.strokes.retain(|stroke| stroke.pen != Pen(0));
+        }
+        self.pages.retain(|page| !page.drawing.is_empty());
+    }
+
     /// The end of the file.
     pub(crate) fn finish(mut self, commands: usize, syntax_findings: Findings) -> Reading {
         if self.polygon.is_open() {
@@ -241,6 +257,7 @@ impl Interpreter {
         if !strokes.is_empty() || self.pages.is_empty() {
             self.pages.push(Page { drawing: Drawing { strokes } });
         }
+        self.settle_ink_of_no_pen();
         self.report_pages();
         let mut diagnostics = syntax_findings.into_vec();
         diagnostics.extend(self.findings.into_vec());

@@ -132,9 +132,8 @@ impl Interpreter {
             self.report(codes::EMPTY_POLYGON, || "there is no polygon to draw".into());
             return;
         }
-        if self.ink() {
-            self.draw_outlines();
-        }
+        self.ink();
+        self.draw_outlines();
     }
 
     /// Draws the outlines in the buffer.

@@ -24,7 +24,8 @@ impl Interpreter {
     fn lower(&mut self) {
         if !self.down {
             self.down = true;
-            if !self.polygon.is_open() && self.ink() {
+            if !self.polygon.is_open() {
+                self.ink();
                 self.tracer.lower(self.position_mm);
             }
         }
@@ -52,13 +53,14 @@ impl Interpreter {
         if pairs.len() == 0 {
             return;
         }
-        if self.polygon.is_open() || !self.down || !self.ink() {
+        if self.polygon.is_open() || !self.down {
             for pair in pairs {
                 let to = self.target(self.position, pair[0], pair[1]);
                 self.go(to);
             }
             return;
         }
+        self.ink();
         for pair in pairs {
             let to = self.target(self.position, pair[0], pair[1]);
             if !(to.x.abs() <= SANE_PLU && to.y.abs() <= SANE_PLU) {
@@ -90,7 +92,8 @@ impl Interpreter {
         let to_mm = self.frame.mm_of_plu(to);
         if self.polygon.is_open() {
             self.polygon.line(self.position_mm, to_mm, self.down);
-        } else if self.down && self.ink() {
+        } else if self.down {
+            self.ink();
             self.tracer.line(self.position_mm, to_mm);
         }
         self.position = to;

@@ -29,6 +29,29 @@ enum Language {
     Job,
 }
 
+/// The result of a search that is done at most once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Searched {
+    NotYet,
+    Nowhere,
+    At(usize),
+}
+
+/// What one step of reading comes to.
+enum Step {
+    /// The file is at its end.
+    End,
+    /// Something was read that is no command.
+    Nothing,
+    Command(Head),
+}
+
+impl From<Option<Head>> for Step {
+    fn from(head: Option<Head>) -> Self {
+        head.map_or(Self::Nothing, Self::Command)
+    }
+}
+
 /// What the parser noticed about the file as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Hints {
@@ -59,9 +82,9 @@ pub(crate) struct Parser<'a> {
     pub(crate) findings: Findings,
     pub(crate) hints: Hints,
     /// Where each byte value occurs last, as far as it was asked for.
-    last: Vec<Option<Option<usize>>>,
+    last: Vec<Searched>,
     /// The next entry into HP-GL/2, once searched for.
-    next_entry: Option<Option<usize>>,
+    next_entry: Searched,
     encoding_known: bool,
 }
 
@@ -79,8 +102,8 @@ impl<'a> Parser<'a> {
             unfinished: None,
             findings: Findings::default(),
             hints: Hints::default(),
-            last: vec![None; 256],
-            next_entry: None,
+            last: vec![Searched::NotYet; 256],
+            next_entry: Searched::NotYet,
             encoding_known: false,
         }
     }
@@ -164,13 +187,15 @@ impl<'a> Parser<'a> {
             }
         }
         loop {
-            let head = match self.language {
-                Language::HpGl => self.hpgl()?,
-                Language::Pcl => self.pcl()?,
-                Language::Job => self.job()?,
+            let step = match self.language {
+                Language::HpGl => self.hpgl(),
+                Language::Pcl => self.pcl(),
+                Language::Job => self.job(),
             };
-            if head.is_some() {
-                return head;
+            match step {
+                Step::End => return None,
+                Step::Nothing => {}
+                Step::Command(head) => return Some(head),
             }
         }
     }
@@ -182,38 +207,32 @@ impl<'a> Parser<'a> {
         Head { mnemonic, span, number: self.number, text: Span { start: self.at, end: self.at } }
     }
 
-    /// One step between commands. The outer `None` is the end of the file, the inner one "nothing yet".
-    #[expect(clippy::option_option, reason = "end of file and nothing yet are different answers")]
-    fn hpgl(&mut self) -> Option<Option<Head>> {
-        let byte = *self.bytes.get(self.at)?;
+    /// One step between commands.
+    fn hpgl(&mut self) -> Step {
+        let start = self.at;
+        let Some(&byte) = self.bytes.get(start) else { return Step::End };
         match class(byte) {
-            Class::Letter => return Some(self.letters()),
+            Class::Letter => return self.letters().into(),
             Class::Terminator | Class::Blank | Class::Comma | Class::LineEnd => self.at += 1,
-            Class::Escape => return Some(self.escape()),
+            Class::Escape => return self.escape().into(),
             Class::Control => {
-                let at = self.at;
                 self.at += 1;
-                self.report_control(Mnemonic::NONE, at);
+                self.report_control(Mnemonic::NONE, start);
             }
             Class::Digit | Class::Sign | Class::Point => {
-                let start = self.at;
                 self.skip_parameters();
                 let span = Span { start, end: self.at };
                 self.report(codes::NUMBERS_WITHOUT_COMMAND, Mnemonic::NONE, span, || {
                     ("numbers that belong to no command are skipped".into(), None)
                 });
             }
+            Class::Other if self.bytes[start..].starts_with(b"@PJL") => self.language = Language::Job,
             Class::Other => {
-                let start = self.at;
-                if self.bytes[start..].starts_with(b"@PJL") {
-                    self.language = Language::Job;
-                    return Some(None);
-                }
                 self.at += 1;
                 self.report_stray(Mnemonic::NONE, start);
             }
         }
-        Some(None)
+        Step::Nothing
     }
 
     fn report_control(&mut self, mnemonic: Mnemonic, at: usize) {
@@ -248,16 +267,12 @@ impl<'a> Parser<'a> {
             self.skip_word(start);
             return None;
         }
-        match form_of(mnemonic) {
-            Some(form) => {
-                self.at += 2;
-                self.command(mnemonic, form, start)
-            }
-            None => {
-                self.resynchronise(start);
-                None
-            }
-        }
+        let Some(form) = form_of(mnemonic) else {
+            self.resynchronise(start);
+            return None;
+        };
+        self.at += 2;
+        self.command(mnemonic, form, start)
     }
 
     /// A letter with something else than a letter after it. GhostPDL lets blanks and control bytes pass between
@@ -637,7 +652,14 @@ impl<'a> Parser<'a> {
     /// Where a byte occurs last in the file.
     fn last_of(&mut self, byte: u8) -> Option<usize> {
         let bytes = self.bytes;
-        *self.last[usize::from(byte)].get_or_insert_with(|| bytes.iter().rposition(|&b| b == byte))
+        let last = &mut self.last[usize::from(byte)];
+        if *last == Searched::NotYet {
+            *last = bytes.iter().rposition(|&b| b == byte).map_or(Searched::Nowhere, Searched::At);
+        }
+        match *last {
+            Searched::At(place) => Some(place),
+            _ => None,
+        }
     }
 
     /// `LB`, `BL`, `WD`: text up to the terminator.
@@ -671,10 +693,10 @@ impl<'a> Parser<'a> {
         if at_end || cut.is_some() {
             let terminator = self.terminator.escape_ascii();
             self.report(codes::LABEL_WITHOUT_TERMINATOR, mnemonic, Span { start, end }, || {
-                let place = if at_end { "the end of the file" } else { "where commands go on" };
+                let place = if at_end { "the end of the file" } else { "the next command" };
                 (
                     format!(
-                        "the text of `{mnemonic}` has no terminator (`{terminator}`); it is ended at {place}"
+                        "the text of `{mnemonic}` has no terminator (`{terminator}`); it is taken to end at {place}"
                     ),
                     Some("end labels with the byte 3, or name the terminator that the file uses".into()),
                 )
@@ -719,6 +741,9 @@ impl<'a> Parser<'a> {
             }
         }
         let text = Span { start: self.at - 1, end: self.at };
+        if self.bytes.get(self.at) == Some(&b',') {
+            self.at += 1;
+        }
         self.number_list(mnemonic, false, true);
         self.finish(mnemonic, start, text)
     }

@@ -2,7 +2,7 @@
 
 use drawing::Span;
 
-use super::{Head, Language, Parser};
+use super::{Head, Language, Parser, Searched, Step};
 use crate::codes;
 use crate::envelope::{self, DeviceControl, Escape};
 use crate::lexer::{Class, class};
@@ -84,34 +84,31 @@ impl Parser<'_> {
     /// Whether HP-GL/2 is entered after this place by `ESC %#B` or by job control; if not, what looks like PCL cannot
     /// be meant as such.
     fn hpgl_is_entered_later(&mut self) -> bool {
-        let known = match self.next_entry {
-            Some(None) => Some(false),
-            Some(Some(place)) if place >= self.at => Some(true),
-            _ => None,
-        };
-        known.unwrap_or_else(|| {
-            let found = (self.at..self.bytes.len()).find(|&at| {
-                let rest = &self.bytes[at..];
-                match rest[0] {
-                    0x1b => {
-                        rest.get(1) == Some(&b'%') && matches!(envelope::escape(rest).0, Escape::EnterHpGl(_))
-                    }
-                    b'L' => rest.starts_with(b"LANGUAGE"),
-                    _ => false,
+        match self.next_entry {
+            Searched::Nowhere => return false,
+            Searched::At(place) if place >= self.at => return true,
+            _ => {}
+        }
+        let found = (self.at..self.bytes.len()).find(|&at| {
+            let rest = &self.bytes[at..];
+            match rest[0] {
+                0x1b => {
+                    rest.get(1) == Some(&b'%') && matches!(envelope::escape(rest).0, Escape::EnterHpGl(_))
                 }
-            });
-            self.next_entry = Some(found);
-            found.is_some()
-        })
+                b'L' => rest.starts_with(b"LANGUAGE"),
+                _ => false,
+            }
+        });
+        self.next_entry = found.map_or(Searched::Nowhere, Searched::At);
+        found.is_some()
     }
 
     /// One step in PCL or RTL: everything up to the next ESC is text on the page, which no pen draws.
-    #[expect(clippy::option_option, reason = "end of file and nothing yet are different answers")]
-    pub(super) fn pcl(&mut self) -> Option<Option<Head>> {
+    pub(super) fn pcl(&mut self) -> Step {
         let start = self.at;
         let rest = &self.bytes[start..];
         if rest.is_empty() {
-            return None;
+            return Step::End;
         }
         let length = rest.iter().position(|&b| b == 0x1b).unwrap_or(rest.len());
         self.at = start + length;
@@ -121,33 +118,32 @@ impl Parser<'_> {
                 ("text outside HP-GL/2 (PCL) is not drawn".into(), None)
             });
         }
-        if self.at == self.bytes.len() { None } else { Some(self.escape()) }
+        if self.at == self.bytes.len() { Step::End } else { self.escape().into() }
     }
 
     /// One step in job control: lines that begin with `@PJL`.
-    #[expect(clippy::option_option, reason = "end of file and nothing yet are different answers")]
-    pub(super) fn job(&mut self) -> Option<Option<Head>> {
+    pub(super) fn job(&mut self) -> Step {
         let rest = &self.bytes[self.at..];
-        let &byte = rest.first()?;
+        let Some(&byte) = rest.first() else { return Step::End };
         if let Some((length, language)) = envelope::job_line(rest) {
             self.at += length;
             if let Some(language) = language {
                 let hpgl = language.to_ascii_uppercase().starts_with(b"HPGL");
                 self.language = if hpgl { Language::HpGl } else { Language::Pcl };
             }
-            return Some(None);
+            return Step::Nothing;
         }
         match class(byte) {
-            Class::Escape => Some(self.escape()),
+            Class::Escape => self.escape().into(),
             Class::Blank | Class::LineEnd | Class::Control => {
                 self.at += 1;
-                Some(None)
+                Step::Nothing
             }
             // A plotter's own language needs no announcement.
             _ => {
                 self.language = Language::HpGl;
                 // The parser's own test for `@PJL` has failed here, so that this cannot go round in circles.
-                Some(None)
+                Step::Nothing
             }
         }
     }

@@ -1,0 +1,506 @@
+//! What real files do to the language: one small file a habit, and the ink that it must give.
+//!
+//! Expected geometry rests on the HP-GL/2 rules as GhostPDL's interpreter and hp2xx show them on probe files; where the
+//! two differ, the comment says which one is followed and why.
+
+use std::fmt::Write as _;
+
+use hpgl::{Options, Reading, Severity, read};
+
+fn reading(bytes: &[u8]) -> Reading {
+    let options = Options::default();
+    let reading = read(bytes, &options);
+    assert_eq!(reading, hpgl::interpret(&hpgl::parse(bytes, &options), &options), "one pass and two differ");
+    reading
+}
+
+/// The strokes of the first page in plotter units: `pen: x,y x,y ...`, curves marked by `~` before their end.
+fn ink(reading: &Reading) -> Vec<String> {
+    let stroke = |stroke: &drawing::Stroke| {
+        let plu = |mm: f64| {
+            let value = mm / hpgl::PLOTTER_UNIT_MM;
+            ((value * 1e4).round() / 1e4 + 0.0).to_string()
+        };
+        let mut text = format!("{}: {},{}", stroke.pen.0, plu(stroke.start().x), plu(stroke.start().y));
+        for segment in stroke.segments() {
+            let curve = if matches!(segment, drawing::Segment::Line(_)) { "" } else { "~" };
+            let _ = write!(text, " {curve}{},{}", plu(segment.end().x), plu(segment.end().y));
+        }
+        text
+    };
+    reading.pages[0].drawing.strokes.iter().map(stroke).collect()
+}
+
+fn codes(reading: &Reading) -> Vec<&'static str> {
+    reading.diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect()
+}
+
+#[track_caller]
+fn check(bytes: &[u8], strokes: &[&str], diagnostics: &[&str]) {
+    let reading = reading(bytes);
+    assert_eq!(ink(&reading), strokes, "ink of {:?}", bytes.escape_ascii().to_string());
+    assert_eq!(codes(&reading), diagnostics, "diagnostics of {:?}", bytes.escape_ascii().to_string());
+}
+
+/// The same corner, however it is said.
+#[track_caller]
+fn corner(bytes: &[u8], diagnostics: &[&str]) {
+    check(bytes, &["1: 0,0 400,0 400,400"], diagnostics);
+}
+
+#[test]
+fn separators_and_terminators() {
+    corner(b"IN;SP1;PA0,0;PD400,0,400,400;PU;SP0;", &[]);
+    corner(b"INSP1PA0,0PD400,0,400,400PUSP0", &[]);
+    corner(b"IN SP1 PA 0,0 PD 400,0 400,400 PU SP0", &[]);
+    corner(b"IN;SP 1;PA 0 0;PD 400 0 400 400;PU;SP0;", &[]);
+    corner(b"IN;SP1;PA0+0PD400-0+400+400;PU;SP0;", &[]);
+    corner(b"IN\r\nSP1\r\nPA0,0\r\nPD400,0,\r\n400,400\r\nPU\r\nSP0\r\n", &[]);
+    corner(b"IN;;SP1;;PA0,0;;PD400,0,400,400;;PU;;", &[]);
+    corner(b"IN;SP1;PA0,0;PD400,0:PD400,400;PU;SP0;", &[]);
+    corner(b"IN;\r\nPA;SP1\r\n;PU0,0\r\n;PD400,0\r\n;PD400,400\r\n;PU;", &[]);
+    corner(b"IN;SP1;PA\t0,\t0;PD\t400\t0\t400\t400;PU;", &[]);
+    check(b"IN;SP1;PA500,500;PD100-100-200+300;PU;SP0;", &["1: 500,500 100,-100 -200,300"], &[]);
+    // A trailing comma is a separator before nothing.
+    corner(b"IN;SP1;PA0,0;PD400,0,400,400,;PU;", &[]);
+}
+
+#[test]
+fn any_case() {
+    corner(b"in;sp1;pa0,0;pd400,0,400,400;pu;sp0;", &[]);
+    corner(b"In;Sp1;Pa0,0;pD400,0,400,400;Pu;Sp0;", &[]);
+    corner(b"insp1pupa0,0pdpa400,0,400,400pu", &[]);
+}
+
+#[test]
+fn numbers_over_line_ends() {
+    // Interpreters pass over line ends inside numbers: files wrapped at a fixed width.
+    corner(b"IN;SP1;PA0,0;PD40\n0,0,400,40\r\n0;PU;", &["H0109"]);
+    // One pair a line, as written by hand: joined numbers would make an odd count.
+    corner(b"IN;SP1;PA0,0;PD400,0\n400,400;PU;", &["H0109"]);
+    // Joined or not, the count is even; every line end stands between pairs.
+    check(b"IN;SP1;PA0,0;PD400,0\n400,400\n0,400;PU;", &["1: 0,0 400,0 400,400 0,400"], &["H0109"]);
+    // No digits on both sides: nothing to ask.
+    corner(b"IN;SP1;PA0,0;PD400\n,0\n,400,\n400\n;PU;", &[]);
+}
+
+#[test]
+fn decimals_exponents_and_large_numbers() {
+    check(b"IN;SP1;PA0.5,0.25;PD400.75,.5,400.,400.49;PU;SP0;", &["1: 0.5,0.25 400.75,0.5 400,400.49"], &[]);
+    corner(b"IN;SP1;PA0,0;PD4e2,0,4E2,4e+2;PU;SP0;", &[]);
+    corner(b"IN;SP1;PA0,0;PD40000e-2,0,4.00E2,400;PU;SP0;", &[]);
+    // The E of a command is none of an exponent.
+    check(b"IN;SP1;PA0,0;PD400,0EA500,300PU", &["1: 0,0 400,0", "1: 400,0 500,0 500,300 400,300 400,0"], &[]);
+    check(b"IN;SP1;PA0,0;PD40000,0,40000,40000;PU;", &["1: 0,0 40000,0 40000,40000"], &[]);
+    // GhostPDL drops the command; only the pair that has the number is dropped here.
+    check(b"IN;SP1;PA0,0;PD99999999999,0;PD400,400;PU;", &["1: 0,0 400,400"], &["H0108"]);
+    check(b"IN;SP1;PA0,0;PD400,0,1e300,7,400,400;PU;", &["1: 0,0 400,0 400,400"], &["H0108"]);
+    let digits = format!("IN;SP1;PA0,0;PD400.{},0,400,400;", "0".repeat(300));
+    corner(digits.as_bytes(), &[]);
+    let digits = format!("IN;SP1;PA0,0;PD{},0,400,400;", "9".repeat(300));
+    check(digits.as_bytes(), &["1: 0,0 400,400"], &["H0108"]);
+    // Another command with such a number has no effect: the scale is not taken away.
+    check(
+        b"IN;SP1;IP0,0,100,100;SC0,10,0,10;SC0,99999999999,0,1;PA0,0;PD1,1;",
+        &["1: 0,0 10,10"],
+        &["H0108"],
+    );
+}
+
+#[test]
+fn empty_parameters_and_odd_counts() {
+    check(b"IN;SP1;PA0,0;PD400,,400;PD400,0;PU;", &["1: 0,0 400,400 400,0"], &["H0107"]);
+    corner(b"IN;SP1;PA0,0;PD,400,0;PD400,400;PU;SP0;", &["H0107"]);
+    // hp2xx gives the whole file up.
+    check(b"IN;SP1;PA0,0;PD400,0,400;PU;SP0;", &["1: 0,0 400,0"], &["H0206"]);
+    corner(b"IN;SP1;PA0,0;PD400,0,400;PD400,400;PU;SP0;", &["H0206"]);
+    corner(b"IN;SP1;PA0,0;PD400,0,-,400,400;PU;", &["H0102"]);
+}
+
+#[test]
+fn stray_bytes() {
+    corner(b"\xef\xbb\xbfIN;SP1;PA0,0;PD400,0,400,400;PU;SP0;", &["H0103"]);
+    corner(b"!IN;SP1;PA0,0;PD400,0,400,400;PU;@", &["H0102"]);
+    corner(b"IN;\x00\x00SP1;PA0,0;\x00PD400,\x000,4\x0000,400;PU;SP0;\x00\x00", &["H0103", "H0103"]);
+    corner(b"IN;\x03SP1;PA0,0;PD400,0,400,400;\x03PU;SP0;\x1a", &["H0103"]);
+    corner(b"\x03IN;SP1;PA0,0;PD400,0,400,400;", &["H0103"]);
+    // UTF-16 is ASCII with a NUL after each byte.
+    let wide: Vec<u8> = b"IN;SP1;PA0,0;PD400,0,400,400;PU;".iter().flat_map(|&b| [b, 0]).collect();
+    assert_eq!(ink(&reading(&wide)), ["1: 0,0 400,0 400,400"]);
+}
+
+#[test]
+fn names_that_are_none() {
+    corner(b"IN;SP1;PA0,0;ZQ1,2,3;PD400,0;XX;PD400,400;PU;SP0;", &["H0101", "H0101"]);
+    corner(b"IN;SP1;PA0,0;Z;PD400,0;PD400,400;PU;SP0;", &["H0101"]);
+    corner(b"IN;SP1;PA0,0;ZPD400,0;ZQPD400,400;PU;", &["H0101", "H0101"]);
+    corner(b"IN;SP1;PA0,0;ZQ1,2PD400,0,400,400;PU;", &["H0101"]);
+    check(b"IN;SP1;P A0,0;P D400,0;PU;SP0;", &["1: 0,0 400,0"], &["H0106", "H0106"]);
+    // `XT` would draw a tick, `AR` and `ER` would miss their parameters.
+    corner(
+        b"IN;SP1;PA0,0;PD400,0,400,400;PU;\r\n%%EOF garbage text here\x04\xff\xff",
+        &["H0102", "H0101", "H0105"],
+    );
+    assert_eq!(
+        ink(&reading(b"IN;SP1;PA0,0;PD400,0,400,400;PU;THIS TEXT IS NOT A PLOT")),
+        ["1: 0,0 400,0 400,400"]
+    );
+    corner(b"INPU;SP1;PU0,0;PD400,0,400,400;", &[]);
+    corner(b"IN;SP1;1,2,3;PA0,0;PD400,0,400,400;", &["H0104"]);
+}
+
+#[test]
+fn device_control() {
+    corner(b"\x1b.(\x1b.I81;;17:\x1b.N;19:IN;SP1;PA0,0;\x1b.MPD400,0,400,400;PU;SP0;\x1b.)", &["H0113"]);
+    corner(b"\x1b.(;\x1b.@;3:IN;SP1;PA0,0;PD400,0,400,400;PU;\x1b.Z", &[]);
+    // hp2xx gives the whole file up.
+    corner(b"IN;SP1;PA0,0;PD400,\x1b.B0,400,400;PU;SP0;", &[]);
+    corner(b"IN;SP1;PA0,0;PD40\x1b.B0,0,400,40\x1b.M1;2:0;PU;SP0;", &[]);
+}
+
+#[test]
+fn wrappers() {
+    corner(b"\x1bE\x1b&l1O\x1b%0BIN;SP1;PA0,0;PD400,0,400,400;PU;\x1b%0A\x1bE", &[]);
+    corner(b"\x1b%-1BBP;IN;SP1;PA0,0;PD400,0,400,400;PU;PG;", &[]);
+    corner(
+        b"\x1b%-12345X@PJL JOB\r\n@PJL ENTER LANGUAGE=HPGL2\r\nBP;IN;SP1;PA0,0;PD400,0,400,400;PU;PG;\
+          \x1b%-12345X@PJL EOJ\r\n",
+        &[],
+    );
+    // Binary data are skipped by their count, whatever they look like.
+    corner(
+        b"\x1bE\x1b*r1A\x1b*b26WIN;SP1;PA0,0;PD7,7,8,8;PU;\x1b%0B\x1b%0BIN;SP1;PA0,0;PD400,0,400,400;PU;\
+          \x1b%1A\x1b*b3m4w\x1b%0B3W\x1b%0\x1bE",
+        &["H0116"],
+    );
+    // A reset before plain HP-GL that nothing enters.
+    corner(b"\x1bEIN;SP1;PA0,0;PD400,0,400,400;PU;", &[]);
+    corner(b"\x1b%-12345X\x1bEIN;SP1;PA0,0;PD400,0,400,400;PU;\x1b%-12345X", &[]);
+    corner(b"\x1bEHello\x1b%0BIN;SP1;PA0,0;PD400,0,400,400;PU;\x1b%0A", &["H0115"]);
+    // Out and in again within a coordinate list.
+    corner(b"IN;SP1;PA0,0;PD400,0\x1b%0A\x1b%0BPD400,400;PU;", &[]);
+}
+
+#[test]
+fn text_does_not_swallow_the_plot() {
+    let hidden = |text: &[u8]| {
+        let reading = reading(text);
+        assert!(
+            reading.pages[0].drawing.bounding_box().is_some_and(|b| b.x1 >= 10.0 && b.x1 < 100.0),
+            "{:?}",
+            text.escape_ascii().to_string()
+        );
+        codes(&reading).contains(&"H0110") || codes(&reading).contains(&"H0112")
+    };
+    assert!(!hidden(b"IN;SP1;PA0,0;LBhi\x03PD400,0;PU;SP0;"));
+    assert!(!hidden(b"IN;SP1;DT#;PA0,0;LBhi#PD400,0;PU;DT;SP0;"));
+    assert!(!hidden(b"IN;SP1;DT#,1;PA0,0;LBhi#PD400,0;PU;SP0;"));
+    assert!(!hidden(b"IN;SP1;PA0,0;LBGr\xfc\xdfe \xe9\x03PD400,0;PU;SP0;"));
+    assert!(!hidden(b"IN;SP1;PA0,0;LBa;b, PUmp\x03PD400,0;PU;SP0;"));
+    assert!(!hidden(b"IN;CO \"a;PD9999,9999;\";SP1;PA0,0;PD400,0;PU;SP0;"));
+    assert!(!hidden(b"BP1,\"a;PD9999,9999;\";SP1;PA0,0;PD400,0;PU;SP0;"));
+    assert!(hidden(b"IN;SP1;PA0,0;LBhello;PD400,0;PU;SP0;"));
+    assert!(hidden(b"IN;SP1;PA0,0;PD400,0;PU;PA500,500;LBhello"));
+    assert!(hidden(b"IN;SP1;PA0,0;LBhello\r\nPD400,0;PU;SP0;"));
+    assert!(hidden(b"IN;SP1;PA0,0;LBhello;PU10,10;PD400,0;PU;LBterminated\x03"));
+    assert!(hidden(b"IN;SP1;PA0,0;LBhello\x1b%0A\x1b%0BPD400,0;"));
+    assert!(hidden(b"IN;SP1;CO \"a;PA0,0;PD400,0;PU;SP0;"));
+}
+
+#[test]
+fn pens() {
+    corner(b"SP1;PA0,0;PD400,0,400,400;PU;SP0;", &[]);
+    corner(b"IN;PA0,0;PD400,0,400,400;PU;", &["H0201"]);
+    check(b"IN;SP1;PD400,0;SP0;PD400,400;PU;", &["1: 0,0 400,0"], &["H0202"]);
+    check(b"IN;SP1;PD400,0;SP;PD400,400;PU;", &["1: 0,0 400,0"], &["H0202"]);
+    // A whole drawing is not lost for a pen that is in the holder.
+    corner(b"IN; SP0; PA0,0;PD400,0,400,400;PU;", &["H0222"]);
+    // A new pen is a new stroke, even where the old one is still down.
+    check(b"IN;SP1;PD400,0;SP2;PD400,400;PU;", &["1: 0,0 400,0", "2: 400,0 400,400"], &[]);
+    check(b"IN;SP1;PD400,0;SP1;PD400,400;PU;", &["1: 0,0 400,0 400,400"], &[]);
+}
+
+#[test]
+fn moves() {
+    corner(b"IN;SP1;PU0,0;PD;PA400,0,400,400;PU;SP0;", &[]);
+    corner(b"IN;SP1;PA0,0;PR;PD400,0,0,400;PU;PA;SP0;", &[]);
+    corner(b"IN;SP1;PDPR400,0PA400,400PU", &[]);
+    check(b"IN;SP1;PU0,0,400,0,400,400;PD800,800;PU;", &["1: 400,400 800,800"], &[]);
+    // Only a lift ends a stroke; points that repeat add nothing.
+    corner(b"IN;SP1;PD;PD400,0;PD;PA400,0;PD400,0,400,400,400,400;PU;PU;", &[]);
+    check(b"IN;SP1;PD400,0;PU;PD400,400;", &["1: 0,0 400,0", "1: 400,0 400,400"], &[]);
+}
+
+#[test]
+fn dots() {
+    check(b"IN;SP1;PU400,400;PD;PU;", &["1: 400,400"], &[]);
+    check(b"IN;SP1;PU400,400;PD400,400;PU;", &["1: 400,400"], &[]);
+    check(b"IN;SP1;PU400,400;PD;", &["1: 400,400"], &[]);
+    check(b"IN;SP1;PU1,1;PD;PU2,2;PD;PU;", &["1: 1,1", "1: 2,2"], &[]);
+    check(b"IN;SP1;PA100,100;CI0;", &["1: 100,100"], &[]);
+    // The pen comes down, then draws: no dot by itself.
+    check(b"IN;SP1;PU4,4;PD;PA8,4;PU;", &["1: 4,4 8,4"], &[]);
+}
+
+#[test]
+fn nothing_to_draw() {
+    check(b"", &[], &[]);
+    check(b"IN;", &[], &[]);
+    assert_eq!(read(b"", &Options::default()).pages.len(), 1);
+}
+
+#[test]
+fn arcs() {
+    check(b"IN;SP1;PA400,0;PD;AA0,0,90;PU;", &["1: 400,0 ~0,400"], &[]);
+    check(b"IN;SP1;PA400,0;PD;AR-400,0,90;PU;", &["1: 400,0 ~0,400"], &[]);
+    check(b"IN;SP1;PA400,0;PU;AA0,0,90;PD0,0;PU;", &["1: 0,400 0,0"], &[]);
+    // A coarse chord angle is meant to be seen; the usual one is not.
+    check(b"IN;SP1;PA400,0;PD;AA0,0,90,45;PU;", &["1: 400,0 282.8427,282.8427 0,400"], &[]);
+    check(b"IN;SP1;PA400,0;PD;AA0,0,90,5;PU;", &["1: 400,0 ~0,400"], &[]);
+    // Radius 4000, 10 off the chord: 2 acos(1 - 10/4000) = 8.1 degrees, so that 90 degrees take twelve chords.
+    let chords = ink(&reading(b"IN;SP1;CT1;PA4000,0;PD;AA0,0,90,10;PU;"));
+    assert_eq!(chords[0].split(' ').count(), 1 + 1 + 12);
+    // Turns beyond the first retrace it; the pen still ends where it should.
+    check(b"IN;SP1;PA400,0;PD;AA0,0,3690;PA0,0;PU;", &["1: 400,0 ~0,400 0,0"], &[]);
+    let ellipse = reading(b"IN;SP1;IP0,0,2000,1000;SC-1,1,-1,1;PA1,0;PD;AA0,0,90;PU;");
+    assert_eq!(ink(&ellipse), ["1: 2000,500 ~1000,1000"]);
+    // Mirrored: counterclockwise in user units is clockwise on the page.
+    let mirrored = reading(b"IN;SP1;IP0,0,1000,1000;SC1,-1,-1,1;PA1,0;PD;AA0,0,90;PU;");
+    assert_eq!(ink(&mirrored), ["1: 0,500 ~500,1000"]);
+    check(b"IN;SP1;PA400,0;PD;AA0,0;PA400,100;PU;", &["1: 400,0 400,100"], &["H0204"]);
+}
+
+#[test]
+fn arcs_through_points() {
+    let half = std::f64::consts::PI * 200.0 * hpgl::PLOTTER_UNIT_MM;
+    for file in [&b"IN;SP1;PA0,0;PD;AT200,200,400,0;PU;"[..], b"IN;SP1;PA0,0;PD;RT200,200,400,0;PU;"] {
+        let reading = reading(file);
+        assert_eq!(ink(&reading), ["1: 0,0 ~400,0"]);
+        assert!((reading.pages[0].drawing.length() - half).abs() < 1e-9);
+        let top = reading.pages[0].drawing.bounding_box().unwrap().y1;
+        assert!((top - 5.0).abs() < 1e-9, "over the upper side");
+    }
+    // All on a line, in between: a line. Beyond the end: there and back. First equal to last: a circle.
+    check(b"IN;SP1;PA0,0;PD;AT200,0,400,0;PU;", &["1: 0,0 400,0"], &["H0215"]);
+    check(b"IN;SP1;PA0,0;PD;AT600,0,400,0;PU;", &["1: 0,0 600,0 400,0"], &["H0215"]);
+    check(b"IN;SP1;PA0,0;PD;AT0,0,400,0;PU;", &["1: 0,0 400,0"], &["H0215"]);
+    check(b"IN;SP1;PA7,7;PD;AT7,7,7,7;PU;", &["1: 7,7"], &["H0215"]);
+    let circle = reading(b"IN;SP1;PA0,0;PD;AT400,0,0,0;PU;");
+    assert!((circle.pages[0].drawing.length() - 2.0 * half).abs() < 1e-9);
+    // A vendor's RT with one number is not an arc.
+    check(b"IN;\nRT10;\nSP1;PA0,0;PD400,0;", &["1: 0,0 400,0"], &["H0204"]);
+}
+
+#[test]
+fn circles() {
+    check(b"IN;SP1;PA1000,1000;CI400;PU;", &["1: 1400,1000 ~1400,1000"], &[]);
+    let triangle = "1: 1400,1000 800,1346.4102 800,653.5898 1400,1000";
+    check(b"IN;SP1;PA1000,1000;CI400,120;PU;", &[triangle], &[]);
+    // A negative radius begins at the left; the pen comes back to the centre, as it was.
+    check(
+        b"IN;SP1;PA1000,1000;CI-400,180;PD2000,1000;PU;",
+        &["1: 600,1000 1400,1000 600,1000", "1: 1000,1000 2000,1000"],
+        &[],
+    );
+}
+
+#[test]
+fn curves() {
+    check(b"IN;SP1;PA0,0;PD;BZ0,400,400,400,400,0;PU;", &["1: 0,0 ~400,0"], &[]);
+    check(b"IN;SP1;PA100,100;PD;BR0,400,400,400,400,0;PU;", &["1: 100,100 ~500,100"], &[]);
+    let curve = reading(b"IN;SP1;PA0,0;PD;BZ0,400,400,400,400,0,1,1;PU;");
+    assert_eq!(codes(&curve), ["H0206"]);
+    // The middle of that cubic is at 3/4 of the height of its control points.
+    assert!((curve.pages[0].drawing.bounding_box().unwrap().y1 - 7.5).abs() < 1e-9);
+}
+
+#[test]
+fn rectangles_and_wedges_leave_the_pen_where_it_is() {
+    check(
+        b"IN;SP1;PA100,100;EA500,300;PD0,0;",
+        &["1: 100,100 500,100 500,300 100,300 100,100", "1: 100,100 0,0"],
+        &[],
+    );
+    check(b"IN;SP1;PA600,100;ER200,200;", &["1: 600,100 800,100 800,300 600,300 600,100"], &[]);
+    check(b"IN;SP1;PA500,500;EW300,0,90;", &["1: 500,500 800,500 ~500,800 500,500"], &[]);
+    check(b"IN;SP1;PA500,500;EW-300,0,90;", &["1: 500,500 200,500 ~500,200 500,500"], &[]);
+    check(b"IN;SP1;PA500,500;EW300,0,360;", &["1: 800,500 ~800,500"], &[]);
+    // The last shape can be drawn again.
+    check(b"IN;SP1;PA0,0;ER10,20;EP;", &["1: 0,0 10,0 10,20 0,20 0,0", "1: 0,0 10,0 10,20 0,20 0,0"], &[]);
+}
+
+#[test]
+fn scales() {
+    check(
+        b"IN;IP0,0,4000,2000;SC0,100,0,100;SP1;PA0,0;PD100,0,100,100,0,0;PU;",
+        &["1: 0,0 4000,0 4000,2000 0,0"],
+        &[],
+    );
+    check(
+        b"IN;IP0,0,4000,2000;SC100,0,100,0;SP1;PA0,0;PD100,0,100,50,0,0;PU;",
+        &["1: 4000,2000 0,2000 0,1000 4000,2000"],
+        &[],
+    );
+    check(
+        b"IN;IP0,0,4000,2000;SC0,100,0,100,1;SP1;PA0,0;PD100,0,100,100,0,0;PU;",
+        &["1: 1000,0 3000,0 3000,2000 1000,0"],
+        &[],
+    );
+    check(
+        b"IN;IP0,0,4000,2000;SC0,100,0,100,1,0,0;SP1;PA0,0;PD100,0,100,100,0,0;PU;",
+        &["1: 0,0 2000,0 2000,2000 0,0"],
+        &[],
+    );
+    check(
+        b"IN;IP100,100,4000,2000;SC0,10,0,20,2;SP1;PA0,0;PD100,0,100,100,0,0;PU;",
+        &["1: 100,100 1100,100 1100,2100 100,100"],
+        &[],
+    );
+    // P2 follows P1, which keeps the size.
+    check(b"IN;IP0,0,1000,1000;IP500,500;SC0,10,0,10;SP1;PA0,0;PD10,10;PU;", &["1: 500,500 1500,1500"], &[]);
+    // The pen stays on the paper when the scale changes under it.
+    check(
+        b"IN;IP0,0,1000,1000;SP1;PU300,400;SC0,10,0,10;PD10,10;SC;PD0,0;",
+        &["1: 300,400 1000,1000 0,0"],
+        &[],
+    );
+    check(b"IN;SP1;SC0,0,0,1;PD400,0;", &["1: 0,0 400,0"], &["H0208"]);
+    check(b"IN;SP1;SC0,1;PD400,0;", &["1: 0,0 400,0"], &["H0203"]);
+    check(b"IN;SP1;IP0,0,0,1000;SC0,1,0,1;PD1,1;", &["1: 0,0 1,1000"], &["H0209"]);
+    // A scale that no paper holds.
+    check(b"IN;SP1;SC0,1e-9,0,1e-9;PD1,1;SC;PD400,0;", &["1: 0,0 400,0"], &["H0207"]);
+    // From P1 at the upper left, y down: what drafting programs write.
+    check(
+        b"BP;IN;PS11056,7977;RO90;IP0,0,1016,-1016;IR0,100;SC0,300,0,300;SP1;PA0,0;PD300,0,300,300;PU;",
+        &["1: 0,0 0,1016 1016,1016"],
+        &[],
+    );
+}
+
+#[test]
+fn rotation_keeps_the_page_in_the_positive_quadrant() {
+    check(b"IN;SP1;PS4000,2000;RO90;PA0,0;PD400,0,400,200;PU;", &["1: 4000,0 4000,400 3800,400"], &[]);
+    check(b"IN;SP1;PS4000,2000;RO180;PA0,0;PD400,200;PU;", &["1: 4000,2000 3600,1800"], &[]);
+    check(b"IN;SP1;PS4000,2000;RO270;PA0,0;PD400,200;PU;", &["1: 0,2000 200,1600"], &[]);
+    check(b"IN;SP1;PS4000,2000;RO45;PA0,0;PD400,200;PU;", &["1: 0,0 400,200"], &["H0203"]);
+    // The pen stays on the paper.
+    check(b"IN;SP1;PS4000,2000;PA100,200;RO90;PD0,0;PU;", &["1: 100,200 4000,0"], &[]);
+}
+
+#[test]
+fn windows() {
+    check(
+        b"IN;SP1;IW100,100,300,300;PA0,200;PD400,200;PU0,0;PD400,400;PU;",
+        &["1: 100,200 300,200", "1: 100,100 300,300"],
+        &["H0210"],
+    );
+    check(b"IN;SP1;IW100,100,300,300;IW;PA0,200;PD400,200;PU;", &["1: 0,200 400,200"], &[]);
+    // Out and in again is two strokes.
+    check(
+        b"IN;SP1;IW0,0,300,300;PA100,100;PD500,100,500,200,100,200;PU;",
+        &["1: 100,100 300,100", "1: 300,200 100,200"],
+        &["H0210"],
+    );
+    // The page that PS sets clips, a default one does not.
+    check(b"IN;SP1;PS4000,2000;PD4000,0,5000,0;", &["1: 0,0 4000,0"], &["H0210"]);
+    check(b"IN;SP1;PD40000,0;", &["1: 0,0 40000,0"], &[]);
+    check(b"IN;SP1;IW5,5,5,9;PD400,0;IW;PD400,400;", &["1: 400,0 400,400"], &["H0211", "H0210"]);
+    // A window in user units moves with the scaling points.
+    check(
+        b"IN;SP1;IP0,0,100,100;SC0,10,0,10;IW0,0,5,10;IP0,0,1000,1000;PA0,0;PD10,0;",
+        &["1: 0,0 500,0"],
+        &["H0210"],
+    );
+    // Arcs are cut exactly and stay arcs.
+    check(b"IN;SP1;IW-500,0,500,500;PA400,0;CI0;PA0,0;CI400;", &["1: 400,0", "1: 400,0 ~-400,0"], &["H0210"]);
+}
+
+#[test]
+fn paper_by_code_is_not_a_page_of_four_units() {
+    check(b"IN;DF;PS4;SP1;PD400,0;", &["1: 0,0 400,0"], &["H0213"]);
+    // One length: a page open to its other side.
+    check(b"BP;IN;PS10668;SP1;PD400,20000;", &["1: 0,0 400,20000"], &[]);
+}
+
+#[test]
+fn encoded_polylines() {
+    corner(b"IN;SP1;PA0,0;PE_\xcb\xbf\xbf_\xcb;PU;SP0;", &[]);
+    check(b"IN;SP1;PA0,0;PE7?x_He?x;PU;SP0;", &["1: 0,0 400,0 300,400"], &[]);
+    check(b"IN;SP1;PA0,0;PE<=G\xc2G\xc2=g\xceG\xc2;PU;SP0;", &["1: 100,100 500,100"], &[]);
+    // Fractional bits divide: hp2xx multiplies.
+    check(b"IN;SP1;PA0,0;PE>\xc7?G\xc2\xcf\xbf?G\xc2;PU;SP0;", &["1: 0,0 400,0.5 400,400.5"], &[]);
+    check(b"IN;SP1;PA0,0;PE_\xcb\xbfPU;SP0;", &["1: 0,0 400,0"], &["H0117"]);
+    check(b"IN;SP1;PA0,0;PE_\xcb\xbfPD400,400;", &["1: 0,0 400,0 400,400"], &["H0117"]);
+    check(
+        b"IN;SP1;PA0,0;PE:\xc5_\xcb\xbf<\xd3\xd3\xbf_\xcb;PU;SP0;",
+        &["3: 0,0 400,0", "3: 410,10 410,410"],
+        &[],
+    );
+    // An editor took the file for Latin-1 and saved it as UTF-8.
+    let text: String = b"IN;SP1;PA0,0;PE_\xcb\xbf\xbf_\xcb;PU;SP0;".iter().map(|&b| char::from(b)).collect();
+    corner(text.as_bytes(), &["H0119"]);
+    check(b"IN;SP1;PA0,0;PE_\xcb\xbf_\xcb;PU;", &["1: 0,0 400,0"], &["H0118"]);
+    // The pen state that PE leaves, and the mode that it found.
+    check(b"IN;SP1;PR;PE_\xcb\xbf;PA400,400;", &["1: 0,0 400,0 400,400"], &[]);
+    check(b"IN;SP1;PR;PE<_\xcb\xbf;PR9,9;PD1,1;", &["1: 409,9 410,10"], &[]);
+}
+
+#[test]
+fn polygons() {
+    check(
+        b"IN;SP1;PA0,0;PM0;PD400,0,400,400,0,400;PM1;PU100,100;PD300,100,300,300,100,300;PM2;EP;PU;",
+        &["1: 0,0 400,0 400,400 0,400 0,0", "1: 100,100 300,100 300,300 100,300 100,100"],
+        &[],
+    );
+    // Nothing is drawn by the definition, and the pen is put back.
+    check(b"IN;SP1;PU5,5;PM0;PD400,0,400,400;PM2;PD6,6;", &["1: 5,5 6,6"], &[]);
+    // Edges with the pen up bound the area but are not drawn.
+    check(
+        b"IN;SP1;PA0,0;PM0;PD400,0;PU400,400;PD0,400;PM2;EP;",
+        &["1: 0,0 400,0", "1: 400,400 0,400 0,0"],
+        &[],
+    );
+    check(b"IN;SP1;PA0,0;PM0;CI400,90;PM2;EP;", &["1: 400,0 0,400 -400,0 0,-400 400,0"], &[]);
+    // A plotter's pen comes down at the corner where the outline begins anyway.
+    check(b"IN;SP1;PA1,1;PD;PM0;PA5,1,5,5;PM2;EP;", &["1: 1,1 5,1 5,5 1,1"], &[]);
+    check(b"IN;SP1;EP;PM2;", &[], &["H0218", "H0203"]);
+    check(b"IN;SP1;PM0;PD400,0;", &[], &["H0217"]);
+}
+
+#[test]
+fn pages() {
+    let reading = reading(b"IN;SP1;PD400,0;PG;PU;PD0,400;PG;AF;");
+    assert_eq!(reading.pages.len(), 2);
+    assert_eq!(codes(&reading), ["H0214"]);
+    assert!(reading.diagnostics.iter().all(|diagnostic| diagnostic.severity == Severity::Note));
+    assert_eq!(ink(&reading), ["1: 0,0 400,0"]);
+}
+
+#[test]
+fn findings_are_counted_not_repeated() {
+    let mut file = b"IN;SP1;".to_vec();
+    for _ in 0..1000 {
+        file.extend_from_slice(b"QQ1,2;PD1,2,3;ZZ;");
+    }
+    let reading = reading(&file);
+    assert_eq!(codes(&reading), ["H0101", "H0206", "H0101"]);
+    assert!(reading.diagnostics.iter().all(|diagnostic| diagnostic.count == 1000));
+    assert_eq!(reading.summary.commands, 2 + 3000);
+}
+
+#[test]
+fn places_of_findings() {
+    let reading = reading(b"IN;SP1;PA400,800;QQ1;");
+    let diagnostic = &reading.diagnostics[0];
+    assert_eq!((diagnostic.span.start, diagnostic.span.end), (17, 19));
+    assert_eq!(diagnostic.command, 4);
+    assert_eq!((diagnostic.pen_position.x, diagnostic.pen_position.y), (10.0, 20.0));
+}
+
+#[test]
+fn strokes_know_their_bytes() {
+    let file = b"IN;SP1;PU0,0;PD400,0;PA400,400;PU;";
+    let reading = reading(file);
+    let source = reading.pages[0].drawing.strokes[0].source;
+    assert_eq!(&file[source.start..source.end], b"PD400,0;PA400,400;");
+}
