@@ -1,4 +1,4 @@
-//! Rows a second through the verifier: `cargo run --release -p verify --example throughput`.
+//! Rows a second through the verifier: `cargo run --release -p verify --example throughput [-- PART-OF-A-NAME]`.
 //!
 //! The plans run through the drawing's points at an even speed; what the motors would say to that is no matter here.
 
@@ -10,7 +10,7 @@
 
 use std::time::Instant;
 
-use drawing::{Drawing, Pen, Point, Span, Stroke, Vec2};
+use drawing::{Affine, Drawing, Pen, Point, Span, Stroke, Vec2};
 use kinematics::{Geometry, Joints, Machine, MachineParts, TwoLink};
 use plan::Row;
 use verify::Verifier;
@@ -66,6 +66,9 @@ fn rows(machine: &Machine, drawing: &Drawing, step: f64, period_us: u64) -> Vec<
 }
 
 fn measure(name: &str, machine: &Machine, drawing: &Drawing, step: f64, period_us: u64, exact: bool) {
+    if std::env::args().nth(1).is_some_and(|only| !name.contains(&only)) {
+        return;
+    }
     let rows = rows(machine, drawing, step, period_us);
     let header = plan::Header { period_us, ..common::header(machine) };
     let began = Instant::now();
@@ -99,15 +102,22 @@ fn fine_arm() -> Option<Machine> {
 fn main() {
     let lines = sheet(400, 1, 0.0);
     let waves = sheet(325, 400, 0.5);
+    let open = sheet(80, 400, 0.5);
     let dense = sheet(130, 10_000, 0.5);
     let cartesian = common::cartesian();
-    for (name, drawing) in
-        [("lines", &lines), ("waves, 130 k vertices", &waves), ("waves, 1.3 M vertices", &dense)]
-    {
+    for (name, drawing) in [
+        ("lines 0.4 mm apart", &lines),
+        ("waves 2 mm apart", &open),
+        ("waves 0.5 mm apart", &waves),
+        ("1.3 M vertices", &dense),
+    ] {
         measure(&format!("cartesian, 10 ms, {name}"), &cartesian, drawing, 0.5, 10_000, true);
         measure(&format!("cartesian, 1 ms, {name}"), &cartesian, drawing, 0.05, 1_000, true);
     }
     measure("cartesian, 1 ms, ticks only, waves", &cartesian, &waves, 0.05, 1_000, false);
+    // Where the arm reaches.
+    let mut waves = waves;
+    waves.transform(Affine::translate((0.0, 150.0)));
     if let Some(arm) = fine_arm() {
         measure("arm, 10 ms, waves", &arm, &waves, 0.5, 10_000, true);
         measure("arm, 1 ms, waves", &arm, &waves, 0.05, 1_000, true);

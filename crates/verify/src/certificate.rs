@@ -57,7 +57,8 @@ impl Deviation {
 /// How a distance is spread along a length. Both figures are bounds from above.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
-    /// Largest distance, mm; never understated, and overstated by a few hundredths of the tolerance at most.
+    /// Largest distance, mm. Never understated; overstated by a hundredth of the tolerance at most for the ink, and for
+    /// the drawing by an eighth (by two thousandths where the ink's straight parts are no shorter than that).
     pub max_mm: f64,
     /// 99 % of the length is at most so far, mm; overstated by 1/64 of itself at most. Dots have no length and count
     /// for the maximum alone.

@@ -63,8 +63,9 @@ impl Piece {
     }
 
     /// The distances of two points from the stroke.
+    #[inline]
     pub(crate) fn distances(&self, points: [Point; 2]) -> [f64; 2] {
-        points.map(|point| self.distance(self.local(point)))
+        [self.distance(self.local(points[0])), self.distance(self.local(points[1]))]
     }
 
     pub(crate) fn bounds(&self) -> Rect {

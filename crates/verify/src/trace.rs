@@ -25,10 +25,10 @@ use crate::{
 /// Chords are merged into a run that stays within this share of the tolerance of each of them.
 const MERGE: f64 = 1.0 / 5000.0;
 /// No run is merged beyond so many tolerances.
-const LONGEST_RUN: f64 = 10.0;
+const LONGEST_RUN: f64 = 40.0;
 /// A bound on the ink's distance is tight enough if it is above the value at the ends by this share of the tolerance
 /// or of itself, whichever is more,
-const TIGHT: (f64, f64) = (1.0 / 200.0, 1.0 / 32.0);
+const TIGHT: (f64, f64) = (1.0 / 200.0, 1.0 / 16.0);
 /// or, where it would be the largest so far, by this share of the tolerance.
 const TIGHTEST: f64 = 1.0 / 5000.0;
 /// A run is not halved more often than this.
@@ -205,7 +205,7 @@ impl Trace {
             self.candidates.push((0.0, index));
             let piece = &strokes.pieces[index as usize];
             let local = LocalRun::new(piece, &run);
-            let distances = local.ends.map(|end| piece.distance(end));
+            let distances = [piece.distance(local.ends[0]), piece.distance(local.ends[1])];
             for (best, distance) in nearest.iter_mut().zip(distances) {
                 if distance < best.0 {
                     *best = (distance, index);
@@ -214,7 +214,7 @@ impl Trace {
             common = better(common, distances);
             self.cover.run(piece, &local, self.radius);
             if let Some(before) = &before {
-                self.cover.joint(piece, &LocalRun::new(piece, before), &local, self.radius);
+                self.cover.joint(piece, before, &local, self.radius);
             }
         }
         // Beyond the radius the list may not hold the nearest piece.
@@ -465,11 +465,12 @@ impl Cover {
         let count = piece.cells as usize;
         let cell = piece.length / f64::from(piece.cells);
         let (first, last) = if piece.length > 0.0 {
-            let first = ((low - radius) / cell).floor().max(0.0) as usize;
-            (first / BLOCK, (((high + radius) / cell).ceil() as usize).min(count).div_ceil(BLOCK))
+            let first = ((low - radius) / cell) as usize;
+            (first / BLOCK, (((high + radius) / cell) as usize + 1).min(count).div_ceil(BLOCK))
         } else {
             (0, 1)
         };
+        let (error, limit) = (run.error as f32, radius as f32);
         for block in first..last {
             let from = block * BLOCK;
             let to = (from + BLOCK).min(count);
@@ -482,23 +483,26 @@ impl Cover {
             }
             let at = piece.first_cell as usize;
             let cells = &mut self.cells[at + from..at + to];
+            let start = if self.sparse { start + 0.5 * cell } else { start };
             let mut squares = [0.0; BLOCK + 1];
-            let offset = if self.sparse { 0.5 } else { 0.0 };
-            for (index, square) in squares[..=cells.len()].iter_mut().enumerate() {
-                *square = run.square_at(((from + index) as f64 + offset) * cell);
+            for (index, square) in (0..).zip(&mut squares[..=cells.len()]) {
+                *square = run.square_at(start + f64::from(index) * cell);
             }
+            // Plain comparisons, which the compiler turns into vectors.
+            let ends = if self.sparse { &squares[..] } else { &squares[1..] };
             let mut largest = 0.0_f32;
-            for (index, covered) in cells.iter_mut().enumerate() {
-                let next = if self.sparse { 0.0 } else { squares[index + 1] };
-                *covered = covered.min(bound(squares[index].max(next), run.error, radius));
-                largest = largest.max(*covered);
+            for ((covered, at_start), at_end) in cells.iter_mut().zip(&squares).zip(ends) {
+                let square = if at_end > at_start { *at_end } else { *at_start };
+                let kept = bound(square as f32, error, limit);
+                *covered = if kept < *covered { kept } else { *covered };
+                largest = if *covered > largest { *covered } else { largest };
             }
             *worst = largest;
         }
     }
 
     /// Notes how well two consecutive runs together cover the cell beside their joint.
-    fn joint(&mut self, piece: &Piece, before: &LocalRun, next: &LocalRun, radius: f64) {
+    fn joint(&mut self, piece: &Piece, before: &Run, next: &LocalRun, radius: f64) {
         let (along, across) = next.ends[0];
         let middle = along.clamp(0.0, piece.length);
         let joint = (along - middle) * (along - middle) + across * across;
@@ -511,18 +515,22 @@ impl Cover {
         if self.sparse || f64::from(*covered) * f64::from(*covered) <= joint {
             return;
         }
+        let before = LocalRun::new(piece, before);
         let (start, end) = (index as f64 * cell, (index + 1) as f64 * cell);
         let square = (before.square_at(start).max(next.square_at(end)))
             .min(next.square_at(start).max(before.square_at(end)))
             .max(joint);
-        *covered = covered.min(bound(square, before.error.max(next.error), radius));
+        *covered = covered.min(bound(square as f32, before.error.max(next.error) as f32, radius as f32));
     }
 }
 
 /// A distance as it is kept: never rounded down, and only up to the radius.
-fn bound(square: f64, error: f64, radius: f64) -> f32 {
-    let mm = square.sqrt() + error;
-    if mm <= radius { (mm * (1.0 + f64::from(f32::EPSILON))) as f32 } else { f32::INFINITY }
+///
+/// Rounding square and error to f32, the root, the sum and the product cost half a unit in the last place (or a unit of
+/// `EPSILON / 2`) each; `4 EPSILON` makes up for all of them.
+fn bound(square: f32, error: f32, radius: f32) -> f32 {
+    let mm = (square.sqrt() + error) * (1.0 + 4.0 * f32::EPSILON);
+    if mm <= radius { mm } else { f32::INFINITY }
 }
 
 /// The pieces about a run.

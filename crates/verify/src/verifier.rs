@@ -165,7 +165,7 @@ impl<'a> Verifier<'a> {
             let inside = value.clamp(joints[index].min, joints[index].max);
             forgiven[index] = value + (inside - value).clamp(-slack, slack);
         }
-        if let Some(fault) = self.machine.joint_fault(&forgiven) {
+        if let Some(fault) = self.machine.joint_fault_between(&forgiven) {
             let place = Place { point_mm: Some(pose.point), ..here };
             self.failures.note(Violation::Joint { fault }, 0, 0.0, place);
         }
