@@ -1,60 +1,61 @@
-//! Lifting the pen's path into joint space, adaptively, with bounds that hold between the nodes too.
+//! Lifting the pen's path into joint space, adaptively, with what a time law must know.
 
-use drawing::{Point, Segment, Vec2};
+use drawing::{Point, Segment};
 use kinematics::{Fault, Joints, Machine, OutOfReach};
 use nalgebra::Vector2;
 
+use crate::path::{Piece, Section};
+
 /// A path in joint space that can be followed without stopping: what a time law is laid upon.
 ///
-/// The parameter `s` is the pen's arc length in mm (drawn paths) or the share of the way from 0 to 1 (travel). The path
-/// is exact: positions come from the pen's own curve through the inverse kinematics, not from interpolation between
-/// the cells' ends.
+/// The parameter `s` runs over the pen's pieces (mm) or over the share of the way from 0 to 1 (travel). The path is exact:
+/// positions come from the pen's own curve through the inverse kinematics, not from interpolation between nodes.
 #[derive(Clone, Debug)]
 pub struct JointPath {
-    course: Course,
+    /// Where the path goes.
+    pub course: Course,
     /// The cells, in order, without gaps; at least one.
     pub cells: Vec<Cell>,
 }
 
+/// Where a joint path goes.
 #[derive(Clone, Debug)]
-enum Course {
-    /// The pen follows these pieces.
-    Drawn(Vec<Segment>),
+pub enum Course {
+    /// The pen follows these pieces, beginning in this pose.
+    Drawn(Joints, Section),
     /// The joints go straight from one pose to the other; the pen is up.
     Travel(Joints, Joints),
 }
 
-/// A stretch of a joint path with bounds that hold everywhere on it.
+/// A stretch of a joint path between two nodes.
 #[derive(Clone, Debug)]
 pub struct Cell {
     /// Its length in the parameter `s`.
     pub length: f64,
-    /// Bound on the size of each motor's first derivative by `s`, ticks per unit of `s`.
-    pub first: Vector2<f64>,
-    /// Bound on the size of each motor's second derivative by `s`.
-    pub second: Vector2<f64>,
-    /// Bound on how much the pen's path bends against linear joint motion, 1/mm: rows `h` mm apart on this cell leave
-    /// the drawn curve by `h² bend / 8` at the most.
+    /// Index of the piece it lies on, and where on it the cell begins, in `s`.
+    pub piece: usize,
+    /// See `piece`.
+    pub start: f64,
+    /// The motors' derivatives by `s` at its start, middle and end, ticks per unit. The two sides of a node differ where
+    /// pieces meet, so each cell has its own.
+    pub first: [Vector2<f64>; 3],
+    /// Second derivatives, likewise.
+    pub second: [Vector2<f64>; 3],
+    /// Largest |dp/ds| of the pen.
+    pub pen_speed: f64,
+    /// Bound on how much the pen's path bends against linear joint motion, for a unit of (ds/dt)², 1/mm: rows `T` apart
+    /// leave the curve by `(ds/dt)² T² bend / 8` at the most.
     pub bend: f64,
-    /// Joints at the cell's start: the inverse is unwrapped to the turn nearest to it.
-    pose: Joints,
-    /// Index of the piece and the range of its own parameter.
-    piece: usize,
-    t0: f64,
-    t1: f64,
-    /// dt/ds at both ends.
-    rate0: f64,
-    rate1: f64,
+    /// By how much the derivatives may exceed a straight line between the three samples, as a share of the limits: 0
+    /// where they are linear in `s` (lines and parabolas on machines whose kinematics are linear).
+    pub slack: f64,
 }
 
-/// Joints may change by no more than this over a cell, rad: no peak of a derivative can hide between its samples.
+/// No joint turns by more over a cell, rad: no peak of a derivative can hide between its samples.
 const LARGEST_TURN: f64 = 0.15;
 
-/// How much the derivatives may vary over a cell, as a share of the largest.
-const LARGEST_VARIATION: f64 = 0.05;
-
-/// How far the interpolated rate dt/ds may be off in the middle of a cell, as a share of itself.
-const LARGEST_MISMATCH: f64 = 1e-3;
+/// How far the derivatives in the middle of a cell may be from the mean of its ends, as a share of what limits speed.
+const LARGEST_BULGE: f64 = 0.02;
 
 /// Cells are not cut shorter than this, mm.
 const SHORTEST: f64 = 1e-5;
@@ -62,16 +63,15 @@ const SHORTEST: f64 = 1e-5;
 /// The path and its derivatives at one place.
 #[derive(Clone, Copy)]
 struct Sample {
-    t: f64,
+    /// Position on the piece, in `s`.
+    s: f64,
     point: Point,
     pose: Joints,
-    /// ds/dt
-    speed: f64,
     first: Vector2<f64>,
     second: Vector2<f64>,
-    /// Of the drawn curve, 1/mm.
-    curvature: f64,
-    /// See [`Cell::bend`].
+    pen_speed: f64,
+    /// Curvature times speed², 1/mm.
+    turning: f64,
     bend: f64,
 }
 
@@ -83,15 +83,13 @@ impl JointPath {
             course: Course::Travel(from, to),
             cells: vec![Cell {
                 length: 1.0,
-                first: change.abs(),
-                second: Vector2::zeros(),
-                bend: 0.0,
-                pose: from,
                 piece: 0,
-                t0: 0.0,
-                t1: 1.0,
-                rate0: 1.0,
-                rate1: 1.0,
+                start: 0.0,
+                first: [change; 3],
+                second: [Vector2::zeros(); 3],
+                pen_speed: 0.0,
+                bend: 0.0,
+                slack: 0.0,
             }],
         })
     }
@@ -100,66 +98,53 @@ impl JointPath {
     ///
     /// Cells are bisected until (1) linear joint motion over a cell would stay within `tolerance` mm of the curve, by
     /// the proved bound of [`kinematics::Geometry::bend`] plus the curve's own chord error; (2) no joint turns by more
-    /// than 0.15 rad over it; (3) the motors' derivatives vary by no more than a twentieth over it, where they matter.
+    /// than 0.15 rad over it; (3) the motors' derivatives in its middle are within a fiftieth of the mean of its ends,
+    /// as a share of what limits the pen.
     ///
     /// # Errors
     /// When a point of it is out of reach, outside the joint limits or nearly singular.
     pub fn lift(
         machine: &Machine,
-        section: Vec<Segment>,
+        section: Section,
         pose: Joints,
         tolerance: f64,
     ) -> Result<Self, OutOfReach> {
-        let mut lifter = Lifter { machine, tolerance, cells: Vec::new() };
+        let mut lifter = Lifter { machine, tolerance, cells: Vec::with_capacity(section.len()) };
         let mut near = pose;
         for (index, piece) in section.iter().enumerate() {
-            machine.check_segment(piece)?;
+            machine.check_segment(&piece.curve)?;
             near = lifter.piece(index, piece, near)?;
         }
-        Ok(Self { course: Course::Drawn(section), cells: lifter.cells })
+        Ok(Self { course: Course::Drawn(pose, section), cells: lifter.cells })
     }
+}
 
-    /// The joints `s` into the cell with the given index, exactly on the path.
-    pub fn pose(&self, machine: &Machine, cell: usize, s: f64) -> Joints {
-        let at = &self.cells[cell];
-        match &self.course {
-            Course::Travel(from, to) => {
-                if s >= at.length {
+impl Course {
+    /// The joints at `s` on a piece, exactly on the path; angles are unwrapped to the turn nearest to `near`.
+    pub fn pose(&self, machine: &Machine, piece: usize, s: f64, near: &Joints) -> Joints {
+        match self {
+            Self::Travel(from, to) => {
+                if s >= 1.0 {
                     *to
                 } else {
                     from + s * (to - from)
                 }
             }
-            Course::Drawn(pieces) => {
-                let point = pieces[at.piece].eval(at.parameter(s));
+            Self::Drawn(_, pieces) => {
+                let piece = &pieces[piece];
+                let point = piece.curve.eval((s * piece.rate).min(1.0));
                 // Reach was checked for the whole piece when it was lifted.
-                machine.pose_near(point, &at.pose).unwrap_or(at.pose)
+                machine.pose_near(point, near).unwrap_or(*near)
             }
         }
     }
 
-    /// The joints at the path's end.
-    pub fn end(&self, machine: &Machine) -> Joints {
-        let last = self.cells.len() - 1;
-        self.pose(machine, last, self.cells[last].length)
-    }
-
-    /// Length in units of `s`.
-    pub fn length(&self) -> f64 {
-        self.cells.iter().map(|cell| cell.length).sum()
-    }
-}
-
-impl Cell {
-    /// The piece's own parameter `s` mm into the cell: the cubic Hermite interpolant of t(s) with the exact rates
-    /// dt/ds at both ends. The point it gives is on the curve whatever its error, which is of fourth order in the
-    /// cell's length; for lines and circles it is the identity.
-    fn parameter(&self, s: f64) -> f64 {
-        let u = (s / self.length).clamp(0.0, 1.0);
-        let rise = self.t1 - self.t0;
-        let (m0, m1) = (self.rate0 * self.length, self.rate1 * self.length);
-        let t = self.t0 + u * (m0 + u * (3.0 * rise - 2.0 * m0 - m1 + u * (m0 + m1 - 2.0 * rise)));
-        t.clamp(self.t0, self.t1)
+    /// The joints at the start.
+    pub fn start(&self) -> Joints {
+        match self {
+            Self::Travel(from, _) => *from,
+            Self::Drawn(pose, _) => *pose,
+        }
     }
 }
 
@@ -169,18 +154,29 @@ struct Lifter<'a> {
     cells: Vec<Cell>,
 }
 
+/// How many cells a curve begins with: enough that the three samples of a cell cannot miss a wave, and that a time law
+/// with one acceleration a cell comes near to the best.
+fn first_cells(piece: &Piece) -> usize {
+    match &piece.curve {
+        Segment::Line(_) => 1,
+        Segment::Arc(arc) => (arc.sweep.abs() / 0.2).ceil().clamp(2.0, 1e6) as usize,
+        Segment::Cubic(cubic) => {
+            // The angle between the end tangents tells how much a blend turns; other cubics may wave between.
+            let (u, v) = (cubic.p1 - cubic.p0, cubic.p3 - cubic.p2);
+            let turn = libm::atan2(u.cross(v).abs(), u.dot(v));
+            (turn / 0.2).ceil().clamp(2.0, 8.0) as usize
+        }
+    }
+}
+
 impl Lifter<'_> {
     /// Lifts one piece and gives the pose at its end.
-    fn piece(&mut self, index: usize, piece: &Segment, near: Joints) -> Result<Joints, OutOfReach> {
-        // Curves begin with a few cells, so that the three samples of a cell cannot miss a whole wave.
-        let parts = match piece {
-            Segment::Line(_) => 1,
-            Segment::Arc(arc) => (arc.sweep.abs() / 0.5).ceil().clamp(1.0, 1e6) as usize,
-            Segment::Cubic(_) => 8,
-        };
+    fn piece(&mut self, index: usize, piece: &Piece, near: Joints) -> Result<Joints, OutOfReach> {
+        let parts = first_cells(piece);
+        let length = piece.length();
         let mut from = self.sample(piece, 0.0, near)?;
         for part in 1..=parts {
-            let to = self.sample(piece, part as f64 / parts as f64, from.pose)?;
+            let to = self.sample(piece, length * (part as f64 / parts as f64), from.pose)?;
             self.cell(index, piece, from, to)?;
             from = to;
         }
@@ -188,14 +184,14 @@ impl Lifter<'_> {
     }
 
     /// Adds the cells between two samples, bisecting as long as one cell would not do.
-    fn cell(&mut self, index: usize, piece: &Segment, from: Sample, to: Sample) -> Result<(), OutOfReach> {
+    fn cell(&mut self, index: usize, piece: &Piece, from: Sample, to: Sample) -> Result<(), OutOfReach> {
         // An explicit stack keeps the order and bounds the memory.
         let mut pending = vec![(from, to)];
         while let Some((a, b)) = pending.pop() {
-            let middle = self.sample(piece, 0.5 * (a.t + b.t), a.pose)?;
-            let length = arc_length(piece, &a, &middle, &b);
-            let mismatch = rate_mismatch(piece, length, &a, &middle, &b);
-            if length > SHORTEST && (mismatch > LARGEST_MISMATCH || !self.is_fine(length, &a, &middle, &b)) {
+            let middle = self.sample(piece, 0.5 * (a.s + b.s), a.pose)?;
+            let length = b.s - a.s;
+            let bulge = self.bulge(&a, &middle, &b);
+            if length > SHORTEST && (bulge > LARGEST_BULGE || !self.is_near(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
                 continue;
@@ -205,25 +201,18 @@ impl Lifter<'_> {
                 let min = self.machine.parts().min_dexterity;
                 return Err(OutOfReach { point: b.point, fault: Fault::Singular { dexterity: 0.0, min } });
             }
-            let variation = [middle.first - a.first, b.first - middle.first];
-            let change = [middle.second - a.second, b.second - middle.second];
-            // Between samples the derivatives can exceed the largest sample only around an extremum, by less than an
-            // eighth of the change between neighbouring samples for anything near a parabola.
-            let first = largest([a.first, middle.first, b.first]) + 0.25 * largest(variation);
-            let second = largest([a.second, middle.second, b.second]) + 0.25 * largest(change);
-            // Where t(s) is interpolated, the pen runs faster than meant by a share that rises from 0 at the ends to
-            // about `mismatch` between them: a rate of change of 4 mismatch / length on the average, twice that at most.
+            let samples = [a, middle, b];
+            let most = |of: fn(&Sample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
             self.cells.push(Cell {
                 length,
-                first: first * (1.0 + 2.0 * mismatch),
-                second: second * (1.0 + 4.0 * mismatch) + first * (8.0 * mismatch / length),
-                bend: 1.05 * a.bend.max(middle.bend).max(b.bend),
-                pose: a.pose,
                 piece: index,
-                t0: a.t,
-                t1: b.t,
-                rate0: 1.0 / a.speed,
-                rate1: 1.0 / b.speed,
+                start: a.s,
+                first: samples.map(|sample| sample.first),
+                second: samples.map(|sample| sample.second),
+                pen_speed: most(|sample| sample.pen_speed),
+                bend: most(|sample| sample.bend),
+                // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
+                slack: 0.5 * bulge,
             });
         }
         Ok(())
@@ -236,85 +225,54 @@ impl Lifter<'_> {
         of(0).max(of(1))
     }
 
-    fn is_fine(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
-        if self.turned(a, b) > LARGEST_TURN {
-            return false;
-        }
-        let geometry = self.machine.geometry();
-        let curvature = a.curvature.max(middle.curvature).max(b.curvature);
-        if (geometry.bend(&a.pose, &b.pose) + length * length * curvature) / 8.0 > self.tolerance {
-            return false;
-        }
-        // Variation matters as a share of what limits the pen: speeds over the motors' limits, accelerations at the
-        // largest speed that could be reached here.
-        let motors = self.machine.motors();
-        let samples = [a, middle, b];
-        let over = |value: &dyn Fn(&Sample, usize) -> f64, limit: &dyn Fn(usize) -> f64| {
-            let mut most = 0.0_f64;
-            let mut spread = 0.0_f64;
-            for k in 0..2 {
-                let values = samples.map(|sample| value(sample, k) / limit(k));
-                let (low, high) = values
-                    .iter()
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-                most = most.max(high.abs()).max(low.abs());
-                spread = spread.max(high - low);
-            }
-            (spread, most)
-        };
-        let (spread, slowness) = over(&|s, k| s.first[k], &|k| motors[k].max_speed);
-        if spread > LARGEST_VARIATION * slowness {
-            return false;
-        }
-        let fastest = self.machine.pen().max_speed.min(1.0 / slowness);
-        let (spread, most) = over(&|s, k| s.second[k], &|k| motors[k].max_acceleration);
-        spread <= LARGEST_VARIATION * most || spread * fastest * fastest <= LARGEST_VARIATION
+    /// Whether the cell is short enough for linear joint motion.
+    fn is_near(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
+        let turning = a.turning.max(middle.turning).max(b.turning);
+        let deviation = (self.machine.geometry().bend(&a.pose, &b.pose) + length * length * turning) / 8.0;
+        self.turned(a, b) <= LARGEST_TURN && deviation <= self.tolerance
     }
 
-    fn sample(&self, piece: &Segment, t: f64, near: Joints) -> Result<Sample, OutOfReach> {
-        let point = piece.eval(t);
+    /// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
+    /// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
+    fn bulge(&self, a: &Sample, middle: &Sample, b: &Sample) -> f64 {
+        let motors = self.machine.motors();
+        let off = |x: f64, y: f64, z: f64| (y - 0.5 * (x + z)).abs();
+        let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);
+        let (mut turning, mut turning_off) = (0.0_f64, 0.0_f64);
+        for (k, motor) in motors.iter().enumerate() {
+            let of = |sample: &Sample| {
+                (sample.first[k] / motor.max_speed, sample.second[k] / motor.max_acceleration)
+            };
+            let (x, y, z) = (of(a), of(middle), of(b));
+            slowness = slowness.max(x.0.abs()).max(y.0.abs()).max(z.0.abs());
+            slowness_off = slowness_off.max(off(x.0, y.0, z.0));
+            turning = turning.max(x.1.abs()).max(y.1.abs()).max(z.1.abs());
+            turning_off = turning_off.max(off(x.1, y.1, z.1));
+        }
+        if slowness == 0.0 {
+            return 0.0;
+        }
+        let fastest = (self.machine.pen().max_speed / a.pen_speed.max(b.pen_speed)).min(1.0 / slowness);
+        let square_speed = (fastest * fastest).min(1.0 / turning);
+        slowness_off / slowness + turning_off * square_speed
+    }
+
+    fn sample(&self, piece: &Piece, s: f64, near: Joints) -> Result<Sample, OutOfReach> {
+        let t = s * piece.rate;
+        let point = piece.curve.eval(t);
         let out = |fault| OutOfReach { point, fault };
         let pose = self.machine.pose_near(point, &near).map_err(|unreachable| out(unreachable.into()))?;
         if let Some(fault) = self.machine.joint_fault_between(&pose) {
             return Err(out(fault));
         }
-        let (velocity, acceleration) = piece.derivatives(t);
-        let speed = velocity.hypot2().sqrt();
-        let tangent = velocity / speed;
-        // By arc length: p' = T, p'' = (a - (a.T) T) / speed².
-        let curvature = (acceleration - acceleration.dot(tangent) * tangent) / (speed * speed);
-        let curvature = if matches!(piece, Segment::Line(_)) { Vec2::ZERO } else { curvature };
-        let (rates, _) = self.machine.geometry().path_derivatives(&pose, tangent, curvature);
-        let (first, second) = self.machine.motor_derivatives(&pose, tangent, curvature);
-        let turn = curvature.hypot2().sqrt();
-        let bend = turn + self.machine.geometry().bend(&pose, &(pose + rates));
-        Ok(Sample { t, point, pose, speed, first, second, curvature: turn, bend })
+        let (velocity, acceleration) = piece.curve.derivatives(t);
+        let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
+        let pen_speed = velocity.hypot2().sqrt();
+        let turning = velocity.cross(acceleration).abs() / pen_speed;
+        let geometry = self.machine.geometry();
+        let (rates, _) = geometry.path_derivatives(&pose, velocity, acceleration);
+        let (first, second) = self.machine.motor_derivatives(&pose, velocity, acceleration);
+        let bend = turning + geometry.bend(&pose, &(pose + rates));
+        Ok(Sample { s, point, pose, first, second, pen_speed, turning, bend })
     }
-}
-
-/// Arc length between two samples: exact for lines and circles, Simpson's rule otherwise.
-fn arc_length(piece: &Segment, a: &Sample, middle: &Sample, b: &Sample) -> f64 {
-    match piece {
-        Segment::Line(_) => {
-            let along = b.point - a.point;
-            libm::hypot(along.x, along.y)
-        }
-        _ => (b.t - a.t) * (a.speed + 4.0 * middle.speed + b.speed) / 6.0,
-    }
-}
-
-/// How far the rate dt/ds of [`Cell::parameter`] is off in the middle of the cell, as a share of the true rate there.
-///
-/// The middle of the Hermite interpolant has the slope 3/2 (t1 - t0) / length - (rate0 + rate1) / 4.
-fn rate_mismatch(piece: &Segment, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> f64 {
-    if matches!(piece, Segment::Line(_)) {
-        return 0.0;
-    }
-    let slope = 1.5 * (b.t - a.t) / length - 0.25 * (1.0 / a.speed + 1.0 / b.speed);
-    (slope * middle.speed - 1.0).abs()
-}
-
-/// The largest size of each component.
-fn largest<const N: usize>(vectors: [Vector2<f64>; N]) -> Vector2<f64> {
-    vectors.iter().fold(Vector2::zeros(), |most, v| most.sup(&v.abs()))
 }

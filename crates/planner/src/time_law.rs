@@ -1,16 +1,21 @@
-//! Trapezoidal speed along a joint path: the fastest that every bound of every cell allows, from rest to rest.
+//! Time-optimal speed along a joint path under every motor's speed and acceleration, from rest to rest.
 //!
 //! With `b = (ds/dt)²` and `u = d²s/dt²`, so `db/ds = 2 u`, a motor with position m(s) has
 //!
 //! ```text
-//! speed         |m'| sqrt(b)          <= v        so  b <= (v / |m'|)²
-//! acceleration  |m' u + m'' b|        <= a        if  |m'| |u| + |m''| b <= a   (sufficient)
+//! speed         |m'| sqrt(b)     <= v      so  b <= (v / |m'|)²
+//! acceleration  |m' u + m'' b|   <= a      linear in (u, b)
 //! ```
-//! Each cell bounds |m'| by Q1 and |m''| by Q2 all over, so on a cell where b nowhere exceeds `top` any u with
-//! `|u| <= (a - Q2 top) / Q1` is allowed: speed rises, stays and falls linearly in time, a trapezoid. Two sweeps over
-//! the cells, forward for rising and backward for falling speed, give the largest b at every node (the reachable and
-//! controllable sets of Pham & Pham 2018, arXiv 1707.07239, in the special case of symmetric bounds, where each is an
-//! interval from 0 and the step has a closed form). Cost linear in the number of cells.
+//! On a cell `u` is constant, so b is linear in s; where m' and m'' are linear too, `m' u + m'' b` is convex or concave
+//! enough that its bounds at the cell's start, middle and end hold between them (what is left is the cell's
+//! [`Cell::slack`], by which the limits are lowered). With `b(f) = b + 2 f length u` at the share f of the cell that is
+//! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b).
+//!
+//! Reachable-set method (Pham & Pham 2018, arXiv 1707.07239). Since (0, 0) is allowed everywhere and all conditions are
+//! convex, the set of b from which the end can be reached is an interval [0, top] at every node. Backward sweep: `top`
+//! at a node is the largest b for which some u fulfils the cell's conditions and leads into [0, top of the next node].
+//! Forward sweep: the largest u at each node. The programs in two variables are solved in closed form by comparing
+//! every lower bound of u with every upper one. Cost linear in the number of cells.
 
 use kinematics::Machine;
 
@@ -19,9 +24,9 @@ use crate::lift::{Cell, JointPath};
 /// A stretch of constant acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
-    /// Index of the cell it lies in.
-    pub cell: usize,
-    /// Where in the cell it begins, in units of the path's parameter.
+    /// Index of the piece it lies on.
+    pub piece: usize,
+    /// Where on the piece it begins, in units of the path's parameter.
     pub start: f64,
     /// Speed at its start, units/s.
     pub speed: f64,
@@ -34,7 +39,7 @@ pub struct Phase {
 /// A speed profile along a joint path, from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
-    /// The phases, in order.
+    /// The phases, in order; at least one.
     pub phases: Vec<Phase>,
     /// How long all of them take, s.
     pub duration: f64,
@@ -43,106 +48,141 @@ pub struct Profile {
 /// What limits the speed beside the motors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedCap {
-    /// Largest speed along the path, units of its parameter per second; infinite for travel.
-    pub speed: f64,
-    /// Largest distance (mm) that linear motion between rows may leave the curve by.
+    /// Largest speed of the pen, mm/s; infinite for travel.
+    pub pen: f64,
+    /// Largest distance (mm) by which linear motion between rows may leave the curve.
     pub row_deviation: f64,
     /// Time between rows, s.
     pub period: f64,
 }
 
-/// Within a cell the speed may rise above that of both its ends only if it rises by a good deal: otherwise the small
-/// steps between neighbouring cells' bounds would make the motors chatter.
-const WORTHWHILE_RISE: f64 = 1.44;
-
 /// The fastest profile along `path` under the machine's motors and the cap.
 pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     let cells = &path.cells;
-    let caps: Vec<f64> = cells.iter().map(|cell| largest_square_speed(machine, cell, cap)).collect();
-    // b at the nodes: at rest at both ends, elsewhere at most what both neighbours allow.
-    let mut nodes = vec![0.0; cells.len() + 1];
-    for k in 1..cells.len() {
-        nodes[k] = caps[k - 1].min(caps[k]);
-    }
-    for k in 0..cells.len() {
-        nodes[k + 1] = nodes[k + 1].min(reachable(machine, &cells[k], nodes[k]));
-    }
+    let bounds: Vec<Bounds> = cells.iter().map(|cell| Bounds::new(machine, cell, cap)).collect();
+    let mut tops = vec![0.0; cells.len() + 1];
     for k in (0..cells.len()).rev() {
-        nodes[k] = nodes[k].min(reachable(machine, &cells[k], nodes[k + 1]));
+        let before = if k > 0 { bounds[k - 1].cap } else { 0.0 };
+        tops[k] = bounds[k].largest(tops[k + 1]).min(bounds[k].cap).min(before);
     }
     let mut phases = Vec::with_capacity(cells.len() + 2);
+    let mut b = 0.0;
     for (k, cell) in cells.iter().enumerate() {
-        trapezoid(machine, cell, k, caps[k], nodes[k], nodes[k + 1], &mut phases);
+        let next = bounds[k].fastest(b, tops[k + 1]);
+        bounds[k].phases(cell, b, next, &mut phases);
+        b = next;
     }
     let duration = phases.iter().map(|phase| phase.duration).sum();
     Profile { phases, duration }
 }
 
-/// The largest b anywhere on the cell at even speed (u = 0).
-fn largest_square_speed(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> f64 {
-    let mut largest = cap.speed * cap.speed;
-    for (k, motor) in machine.motors().iter().enumerate() {
-        let speed = motor.max_speed / cell.first[k];
-        largest = largest.min(speed * speed).min(motor.max_acceleration / cell.second[k]);
-    }
-    // Rows h = sqrt(b) T apart leave the curve by h² bend / 8.
-    largest.min(8.0 * cap.row_deviation / (cap.period * cap.period * cell.bend))
+/// The condition `|p u + r b| <= 1`, p >= 0, with b at the cell's start.
+#[derive(Clone, Copy, Debug, Default)]
+struct Strip {
+    p: f64,
+    r: f64,
 }
 
-/// The largest b at one end of the cell when it is `from` at the other: pure acceleration over the whole cell, bounded
-/// by its largest b: (b - from) Q1 <= 2 length (a - Q2 b) for every motor.
-///
-/// It never is below `from` as long as `from <= a / Q2`, which the cap sees to; it grows with `from`, so that the
-/// backward sweep leaves the forward sweep's conditions true.
-fn reachable(machine: &Machine, cell: &Cell, from: f64) -> f64 {
-    let twice = 2.0 * cell.length;
-    let reached = machine.motors().iter().enumerate().map(|(k, motor)| {
-        (from * cell.first[k] + twice * motor.max_acceleration) / (cell.first[k] + twice * cell.second[k])
-    });
-    reached.fold(f64::INFINITY, f64::min)
-}
-
-/// The phases over one cell from b0 to b1: up, along, down.
-fn trapezoid(
-    machine: &Machine,
-    cell: &Cell,
-    index: usize,
+/// A cell's conditions.
+struct Bounds {
+    strips: [Strip; 6],
+    /// Twice the cell's length: b at its end is `b + twice * u`.
+    twice: f64,
+    /// The largest b anywhere on it by speed.
     cap: f64,
-    b0: f64,
-    b1: f64,
-    phases: &mut Vec<Phase>,
-) {
-    // Up to `top` and down again: (2 top - b0 - b1) Q1 <= 2 length (a - Q2 top).
-    let twice = 2.0 * cell.length;
-    let peak = machine.motors().iter().enumerate().map(|(k, motor)| {
-        (twice * motor.max_acceleration + cell.first[k] * (b0 + b1))
-            / (2.0 * cell.first[k] + twice * cell.second[k])
-    });
-    let peak = peak.fold(cap, f64::min);
-    let higher = b0.max(b1);
-    let top = if peak > WORTHWHILE_RISE * higher { peak } else { higher };
-    let allowed = machine
-        .motors()
-        .iter()
-        .enumerate()
-        .map(|(k, motor)| (motor.max_acceleration - cell.second[k] * top) / cell.first[k]);
-    let allowed = allowed.fold(f64::INFINITY, f64::min);
-    // Only as hard as needed: a ramp between two unequal ends takes the whole cell.
-    let needed = if top > higher { allowed } else { (b1 - b0).abs() / twice };
-    let (up, down) = ((top - b0) / 2.0, (top - b1) / 2.0);
-    let (up, down) = if needed > 0.0 { (up / needed, down / needed) } else { (0.0, 0.0) };
-    let along = (cell.length - up - down).max(0.0);
-    let fast = top.sqrt();
-    let mut start = 0.0;
-    let mut push = |length: f64, from: f64, to: f64| {
-        if length > 0.0 && from + to > 0.0 {
-            let duration = 2.0 * length / (from + to);
-            let acceleration = (to - from) / duration;
-            phases.push(Phase { cell: index, start, speed: from, acceleration, duration });
+    /// For peaks inside the cell: bounds on |m'| / a and |m''| / a.
+    first: [f64; 2],
+    second: [f64; 2],
+}
+
+impl Bounds {
+    fn new(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> Self {
+        let mut strips = [Strip::default(); 6];
+        let (mut first, mut second) = ([0.0_f64; 2], [0.0_f64; 2]);
+        let pen = cap.pen / cell.pen_speed;
+        let mut largest = (pen * pen).min(8.0 * cap.row_deviation / (cap.period * cap.period * cell.bend));
+        for (k, motor) in machine.motors().iter().enumerate() {
+            let limit = motor.max_acceleration / (1.0 + cell.slack);
+            let mut fastest = 0.0_f64;
+            for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
+                let (m1, m2) = (cell.first[j][k] / limit, cell.second[j][k] / limit);
+                let p = m1 + 2.0 * share * cell.length * m2;
+                strips[3 * k + j] = if p < 0.0 { Strip { p: -p, r: -m2 } } else { Strip { p, r: m2 } };
+                first[k] = first[k].max(m1.abs());
+                second[k] = second[k].max(m2.abs());
+                fastest = fastest.max(cell.first[j][k].abs());
+            }
+            let speed = motor.max_speed / (fastest * (1.0 + cell.slack));
+            largest = largest.min(speed * speed);
         }
-        start += length;
-    };
-    push(up.min(cell.length), b0.sqrt(), fast);
-    push(along, fast, fast);
-    push(down.min(cell.length), fast, b1.sqrt());
+        Self { strips, twice: 2.0 * cell.length, cap: largest, first, second }
+    }
+
+    /// The largest b at the start for which some u fulfils all conditions and leads into [0, next].
+    fn largest(&self, next: f64) -> f64 {
+        // Of every pair of a lower and an upper bound of u: lower(b) <= upper(b).
+        let mut largest = f64::INFINITY;
+        let mut allow = |slope: f64, room: f64| {
+            if slope > 0.0 {
+                largest = largest.min(room / slope);
+            }
+        };
+        for (i, one) in self.strips.iter().enumerate() {
+            for other in &self.strips[i + 1..] {
+                // (-1 - r_i b) / p_i <= (1 - r_j b) / p_j, and with i and j exchanged.
+                allow((one.p * other.r - other.p * one.r).abs(), one.p + other.p);
+            }
+            // A motor that stands still here, whatever u.
+            if one.p == 0.0 {
+                allow(one.r.abs(), 1.0);
+            }
+            // (-1 - r b) / p <= (next - b) / twice: the end is not too fast.
+            allow(one.p - self.twice * one.r, one.p * next + self.twice);
+            // -b / twice <= (1 - r b) / p: the end is not below rest.
+            allow(self.twice * one.r - one.p, self.twice);
+        }
+        largest
+    }
+
+    /// The largest b at the end, at most `top`, that can be reached from b at the start.
+    fn fastest(&self, b: f64, top: f64) -> f64 {
+        let highest =
+            |strip: &Strip| if strip.p > 0.0 { (1.0 - strip.r * b) / strip.p } else { f64::INFINITY };
+        let u = self.strips.iter().map(highest).fold(f64::INFINITY, f64::min);
+        (b + self.twice * u).clamp(0.0, top)
+    }
+
+    /// The phases over one cell from b0 to b1: an even ramp, or up to a peak and down again where that is faster.
+    fn phases(&self, cell: &Cell, b0: f64, b1: f64, phases: &mut Vec<Phase>) {
+        // Up to `top` and down again with |u| <= (1 - second * top) / first: (2 top - b0 - b1) first <= twice (1 - second top).
+        let mut top = self.cap;
+        for (first, second) in self.first.iter().zip(self.second) {
+            top = top.min((self.twice + first * (b0 + b1)) / (2.0 * first + self.twice * second));
+        }
+        let higher = b0.max(b1);
+        let mut start = cell.start;
+        let mut push = |length: f64, from: f64, to: f64| {
+            if length > 0.0 && from + to > 0.0 {
+                let (from, to) = (from.sqrt(), to.sqrt());
+                let duration = 2.0 * length / (from + to);
+                let acceleration = (to - from) / duration;
+                phases.push(Phase { piece: cell.piece, start, speed: from, acceleration, duration });
+            }
+            start += length;
+        };
+        // Small peaks between cells whose bounds differ a little would only make the motors chatter.
+        let worthwhile = if self.second == [0.0; 2] { 1.0 + 1e-9 } else { 1.1 };
+        if top <= worthwhile * higher {
+            push(cell.length, b0, b1);
+            return;
+        }
+        let strongest =
+            self.first.iter().zip(self.second).map(|(first, second)| (1.0 - second * top) / first);
+        let u = strongest.fold(f64::INFINITY, f64::min);
+        let up = ((top - b0) / (2.0 * u)).min(cell.length);
+        let down = ((top - b1) / (2.0 * u)).min(cell.length - up);
+        push(up, b0, top);
+        push(cell.length - up - down, top, top);
+        push(down, top, b1);
+    }
 }

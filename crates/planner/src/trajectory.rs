@@ -1,14 +1,14 @@
 //! A whole plan: drawn sections, travel, pen lifts and drops one after the other, sampled into rows of ticks.
 
-use drawing::{Drawing, Pen, Stroke};
-use kinematics::{Joints, Machine, OutOfReach};
+use drawing::{Drawing, Pen, Point, Stroke};
+use kinematics::{Joints, Machine, OutOfReach, Unreachable};
 use nalgebra::Vector2;
 use plan::Row;
 
 use crate::{
     PlanError,
-    lift::JointPath,
-    path::sections,
+    lift::{Course, JointPath},
+    path::{Budget, sections},
     time_law::{Profile, SpeedCap, profile},
 };
 
@@ -23,19 +23,21 @@ pub struct Settings {
     pub park: Option<Joints>,
 }
 
-/// The share of the tolerance that linear motion between rows may use. Only curves with cusps need the rest (the path
-/// is exact elsewhere), and a row may straddle two cells with different bounds.
-const ROW_SHARE: f64 = 0.5;
+/// The largest share of the tolerance that linear motion between rows may use.
+const ROW_SHARE: f64 = 0.4;
 
-/// The share of the tolerance for the chords of curves with cusps.
-const CHORD_SHARE: f64 = 0.25;
+/// The share of the tolerance within which straight pieces may stand for several, where there are corners to blend.
+const SIMPLIFY_SHARE: f64 = 0.3;
 
-/// One step of a plan. Every leg takes a whole number of periods, so that corners and pen events fall on rows: between
-/// rows motors move linearly, and a corner between two rows would be cut.
+/// The share that is kept for what the bounds leave out.
+const RESERVE: f64 = 0.02;
+
+/// One step of a plan. Every leg takes a whole number of periods, so that stops and pen events fall on rows: between rows
+/// motors move linearly, and a stop between two rows would be cut.
 #[derive(Clone, Debug)]
 enum Leg {
     /// Motion along a joint path, from rest to rest.
-    Move { path: JointPath, profile: Profile, periods: u64 },
+    Move { course: Course, profile: Profile, end: Joints, periods: u64 },
     /// The pen changes to this state (0 is up) and the motors stand still for so many periods.
     Pen { pen: u16, periods: u64 },
 }
@@ -83,9 +85,46 @@ pub fn plan<'a>(
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
     }
-    let planner =
-        Planner { machine, settings, legs: Vec::new(), here: machine.start(), times: Times::default() };
-    planner.run(drawing)
+    let budget = Shares::of(machine, settings);
+    let (legs, times) = (Vec::new(), Times::default());
+    Planner { machine, settings, budget, legs, here: machine.start(), times }.run(drawing)
+}
+
+/// How the tolerance is shared out, mm.
+struct Shares {
+    /// To linear motion between rows.
+    row: f64,
+    /// To the path itself.
+    path: Budget,
+}
+
+impl Shares {
+    /// Rows need no more than the largest acceleration can bend the pen's way over a period: by `T² A / 8`. What is
+    /// left goes to the corners.
+    fn of(machine: &Machine, settings: &Settings) -> Self {
+        let period = settings.period_us as f64 * 1e-6;
+        let sheet = machine.sheet();
+        let places = [
+            sheet.center(),
+            Point::new(sheet.x0, sheet.y0),
+            Point::new(sheet.x1, sheet.y0),
+            Point::new(sheet.x1, sheet.y1),
+            Point::new(sheet.x0, sheet.y1),
+        ];
+        let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration);
+        let pen_acceleration = |pose: &Joints| {
+            let jacobian = machine.geometry().jacobian(pose);
+            let of = |rates: Vector2<f64>| (jacobian * machine.joint_rates(&rates)).norm();
+            of(Vector2::new(a, b)).max(of(Vector2::new(a, -b)))
+        };
+        let poses = places.iter().filter_map(|place| machine.pose_near(*place, &machine.start()).ok());
+        let acceleration = poses.map(|pose| pen_acceleration(&pose)).fold(0.0, f64::max);
+        let tolerance = (1.0 - RESERVE) * settings.tolerance;
+        let row = (1.5 * period * period * acceleration / 8.0).min(ROW_SHARE * tolerance);
+        let path = tolerance - row;
+        let simplify = SIMPLIFY_SHARE * path;
+        Self { row, path: Budget { chord: 0.5 * path, simplify, blend: path - simplify } }
+    }
 }
 
 /// Looks for strokes that the machine cannot draw, in the drawing's order; gives the first.
@@ -120,6 +159,7 @@ fn check(settings: &Settings) -> Result<(), PlanError> {
 struct Planner<'a, 'b> {
     machine: &'a Machine,
     settings: &'b Settings,
+    budget: Shares,
     legs: Vec<Leg>,
     here: Joints,
     times: Times,
@@ -153,9 +193,9 @@ impl<'a> Planner<'a, '_> {
                 Ok(paths) => {
                     self.travel(pose);
                     self.pen(stroke.pen, self.machine.pen().drop_time, paths.is_empty());
-                    for path in paths {
-                        self.here = path.end(self.machine);
-                        self.times.drawing += self.movement(path, self.machine.pen().max_speed);
+                    for (path, end) in paths {
+                        self.times.drawing += self.movement(path, end, self.machine.pen().max_speed);
+                        self.here = end;
                     }
                     self.pen(Pen(0), self.machine.pen().lift_time, false);
                     return Ok(());
@@ -166,32 +206,42 @@ impl<'a> Planner<'a, '_> {
         first_error.map_or(Ok(()), Err)
     }
 
-    fn lift(&self, stroke: &Stroke, pose: Joints) -> Result<Vec<JointPath>, OutOfReach> {
-        let tolerance = self.settings.tolerance;
+    /// The stroke's sections as joint paths, each with the pose at its end.
+    fn lift(&self, stroke: &Stroke, pose: Joints) -> Result<Vec<(JointPath, Joints)>, OutOfReach> {
         let mut paths = Vec::new();
         let mut pose = pose;
-        for section in sections(stroke, CHORD_SHARE * tolerance) {
-            let path = JointPath::lift(self.machine, section, pose, tolerance)?;
-            pose = path.end(self.machine);
-            paths.push(path);
+        for section in sections(stroke, &self.budget.path) {
+            let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
+            let path = JointPath::lift(self.machine, section, pose, self.settings.tolerance)?;
+            pose = self.end_pose(&path, end)?;
+            paths.push((path, pose));
         }
         Ok(paths)
     }
 
+    /// The pose at the end of a drawn path, unwrapped along its cells.
+    fn end_pose(&self, path: &JointPath, end: Point) -> Result<Joints, OutOfReach> {
+        let along = path.cells.iter().fold(path.course.start(), |near, cell| {
+            path.course.pose(self.machine, cell.piece, cell.start, &near)
+        });
+        let fault = |unreachable: Unreachable| OutOfReach { point: end, fault: unreachable.into() };
+        self.machine.pose_near(end, &along).map_err(fault)
+    }
+
     fn travel(&mut self, to: Joints) {
         if let Some(path) = JointPath::travel(self.machine, self.here, to) {
-            self.times.travel += self.movement(path, f64::INFINITY);
+            self.times.travel += self.movement(path, to, f64::INFINITY);
         }
         self.here = to;
     }
 
     /// Lays the time law upon a path and gives the time it takes, s.
-    fn movement(&mut self, path: JointPath, speed: f64) -> f64 {
+    fn movement(&mut self, path: JointPath, end: Joints, pen: f64) -> f64 {
         let period = self.settings.period_us as f64 * 1e-6;
-        let cap = SpeedCap { speed, row_deviation: ROW_SHARE * self.settings.tolerance, period };
+        let cap = SpeedCap { pen, row_deviation: self.budget.row, period };
         let profile = profile(self.machine, &path, &cap);
         let periods = whole_periods(profile.duration, period).max(1);
-        self.legs.push(Leg::Move { path, profile, periods });
+        self.legs.push(Leg::Move { course: path.course, profile, end, periods });
         periods as f64 * period
     }
 
@@ -237,6 +287,7 @@ impl Trajectory<'_> {
             period: 0,
             t_us: 0,
             pen: 0,
+            pose: self.start,
             phase: 0,
             phase_start: 0.0,
             finished: false,
@@ -261,6 +312,8 @@ pub struct Rows<'a> {
     period: u64,
     t_us: u64,
     pen: u16,
+    /// Where the joints are.
+    pose: Joints,
     /// Phase of the profile that was last looked at, and the profile's own time at its start.
     phase: usize,
     phase_start: f64,
@@ -277,27 +330,28 @@ impl Iterator for Rows<'_> {
                 None if self.finished => return None,
                 None => {
                     self.finished = true;
-                    return Some(self.emit(self.resting_pose()));
+                    return Some(self.emit());
                 }
                 Some(Leg::Pen { pen, periods }) => {
                     self.pen = *pen;
-                    let row = (*periods > 0).then(|| self.emit(self.resting_pose()));
+                    let row = (*periods > 0).then(|| self.emit());
                     self.t_us += periods * trajectory.period_us;
                     self.leg += 1;
                     if row.is_some() {
                         return row;
                     }
                 }
-                Some(Leg::Move { path, profile, periods }) => {
+                Some(Leg::Move { course, profile, end, periods }) => {
                     if self.period == *periods {
                         self.leg += 1;
                         (self.period, self.phase, self.phase_start) = (0, 0, 0.0);
+                        self.pose = *end;
                         continue;
                     }
                     // The profile is stretched to a whole number of periods, which only slows it down.
                     let time = profile.duration * (self.period as f64 / *periods as f64);
-                    let pose = self.pose_at(path, profile, time);
-                    let row = self.emit(pose);
+                    self.pose = self.pose_at(course, profile, time);
+                    let row = self.emit();
                     self.period += 1;
                     self.t_us += trajectory.period_us;
                     return Some(row);
@@ -308,17 +362,7 @@ impl Iterator for Rows<'_> {
 }
 
 impl Rows<'_> {
-    /// Where the joints are between two moves: at the end of the last one.
-    fn resting_pose(&self) -> Joints {
-        let trajectory = self.trajectory;
-        let last = trajectory.legs[..self.leg].iter().rev().find_map(|leg| match leg {
-            Leg::Move { path, .. } => Some(path.end(trajectory.machine)),
-            Leg::Pen { .. } => None,
-        });
-        last.unwrap_or(trajectory.start)
-    }
-
-    fn pose_at(&mut self, path: &JointPath, profile: &Profile, time: f64) -> Joints {
+    fn pose_at(&mut self, course: &Course, profile: &Profile, time: f64) -> Joints {
         while self.phase + 1 < profile.phases.len()
             && time > self.phase_start + profile.phases[self.phase].duration
         {
@@ -328,11 +372,12 @@ impl Rows<'_> {
         let phase = &profile.phases[self.phase];
         let since = (time - self.phase_start).max(0.0);
         let s = phase.start + since * (phase.speed + 0.5 * phase.acceleration * since);
-        path.pose(self.trajectory.machine, phase.cell, s)
+        // Between rows no joint turns by half a turn, so the last row's pose says which turn this one is in.
+        course.pose(self.trajectory.machine, phase.piece, s, &self.pose)
     }
 
-    fn emit(&self, pose: Joints) -> ExactRow {
-        let exact: Vector2<f64> = self.trajectory.machine.ticks(&pose);
+    fn emit(&self) -> ExactRow {
+        let exact = self.trajectory.machine.ticks(&self.pose);
         let ticks = [exact.x.round() as i64, exact.y.round() as i64];
         ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks }, exact: [exact.x, exact.y] }
     }

@@ -1,0 +1,219 @@
+//! From a stroke to smooth sections: what the pen can follow without stopping.
+//!
+//! ```text
+//! Stroke --clean--> pieces --simplify--> fewer straight pieces --blend--> sections with a continuous tangent
+//! ```
+//! Pieces of no length go, straight pieces in line are joined, vertices that say nothing at this tolerance go, corners
+//! become parabolas inside the tolerance; where the pen turns back it rests. All of it in machine mm.
+
+mod blend;
+mod simplify;
+
+use drawing::{Line, Point, Segment, Stroke, Vec2};
+
+pub use blend::corner_speed_squared;
+
+/// Vertices that lie on the straight line between their neighbours, to this distance in mm, are not corners.
+const COLLINEAR: f64 = 1e-9;
+
+/// The largest break of direction that is not a corner, rad: at 1 m/s it asks for a jump of 1 um/s.
+const SMOOTH_ANGLE: f64 = 1e-6;
+
+/// A curve whose speed |p'(t)| somewhere falls below this share of its largest is taken as chords: at a cusp its
+/// direction has no derivative by length.
+const REGULAR: f64 = 1e-3;
+
+/// How far the planned path may be from the drawing, mm, by what makes it so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Budget {
+    /// Chords that stand for curves with a cusp.
+    pub chord: f64,
+    /// Straight pieces that stand for several.
+    pub simplify: f64,
+    /// Blends that stand for corners.
+    pub blend: f64,
+}
+
+/// A stretch of a section, with the path's parameter `s` running evenly in the curve's own parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// The curve.
+    pub curve: Segment,
+    /// dt/ds, 1/mm: how fast the curve's own parameter runs.
+    pub rate: f64,
+}
+
+impl Piece {
+    /// Its extent in `s`, mm.
+    pub fn length(&self) -> f64 {
+        1.0 / self.rate
+    }
+}
+
+/// Pieces that follow one another with a continuous derivative dp/ds; at least one.
+///
+/// `s` is arc length on lines and circles. On blends it runs evenly in time when the pen's velocity changes evenly, and
+/// on ellipses and cubics in the curve's own parameter; each piece's rate is chosen so that dp/ds, not only its
+/// direction, is the same on both sides of every joint. So ds/dt needs no jumps.
+pub type Section = Vec<Piece>;
+
+/// The smooth sections of a stroke, in order; none for a dot or a stroke that goes nowhere.
+pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
+    let pieces = clean(stroke, budget.chord);
+    let pieces = if budget.simplify > 0.0 { simplify::simplify(pieces, budget.simplify) } else { pieces };
+    blend::sections(&pieces, budget.blend).into_iter().map(parametrise).collect()
+}
+
+/// The stroke's pieces without those of no length, straight ones in line joined, cusped curves as chords.
+fn clean(stroke: &Stroke, chord_tolerance: f64) -> Vec<Segment> {
+    let mut pieces: Vec<Segment> = Vec::with_capacity(stroke.segment_count());
+    let mut add = |piece: Segment| {
+        if direction_at(&piece, 0.0).is_none() {
+            return;
+        }
+        if let (Some(Segment::Line(before)), Segment::Line(next)) = (pieces.last_mut(), &piece)
+            && in_line(before, next)
+        {
+            before.p1 = next.p1;
+            return;
+        }
+        pieces.push(piece);
+    };
+    for segment in stroke.segments() {
+        if is_regular(&segment) {
+            add(segment);
+        } else {
+            let mut from = segment.start();
+            segment.flatten(chord_tolerance, |to| {
+                add(Segment::Line(Line::new(from, to)));
+                from = to;
+            });
+        }
+    }
+    pieces
+}
+
+/// Gives every piece its rate.
+fn parametrise(curves: Vec<Segment>) -> Section {
+    let mut speed = 1.0;
+    let piece = |curve: Segment| {
+        let (start, end) = (velocity(&curve, 0.0), velocity(&curve, 1.0));
+        let rate = speed / start;
+        speed = rate * end;
+        Piece { curve, rate }
+    };
+    curves.into_iter().map(piece).collect()
+}
+
+fn velocity(curve: &Segment, t: f64) -> f64 {
+    curve.derivatives(t).0.hypot2().sqrt()
+}
+
+/// The unit tangent at an end; nothing for a piece of no length.
+fn direction_at(piece: &Segment, t: f64) -> Option<Vec2> {
+    let (first, _) = piece.derivatives(t);
+    let speed = first.hypot2().sqrt();
+    (speed > 0.0).then(|| first / speed)
+}
+
+fn is_smooth(before: Vec2, after: Vec2) -> bool {
+    before.dot(after) > 0.0 && before.cross(after).abs() <= SMOOTH_ANGLE
+}
+
+/// Whether `next` goes on in the direction of `before`: the vertex between lies on the chord, and neither turns back.
+fn in_line(before: &Line, next: &Line) -> bool {
+    let (chord, first) = (next.p1 - before.p0, before.p1 - before.p0);
+    let second = next.p1 - next.p0;
+    first.dot(chord) > 0.0
+        && second.dot(chord) > 0.0
+        && first.cross(chord).abs() <= COLLINEAR * chord.hypot2().sqrt()
+}
+
+/// Whether the speed along the curve stays well above zero, sampled finely enough for arcs and cubics.
+fn is_regular(segment: &Segment) -> bool {
+    let samples = match segment {
+        Segment::Line(_) => return true,
+        Segment::Arc(_) => 64,
+        Segment::Cubic(_) => 32,
+    };
+    let speeds = (0..=samples).map(|k| velocity(segment, f64::from(k) / f64::from(samples)));
+    let (least, most) = speeds.fold((f64::INFINITY, 0.0_f64), |(l, m), v| (l.min(v), m.max(v)));
+    least > REGULAR * most || most == 0.0
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    libm::hypot(a.x - b.x, a.y - b.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use drawing::{EllipticArc, Pen, Span};
+
+    use super::*;
+
+    const EXACT: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.0 };
+
+    fn polyline(points: &[(f64, f64)]) -> Stroke {
+        let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
+        Stroke::polyline(Pen(1), points, Span::default()).unwrap()
+    }
+
+    #[test]
+    fn collinear_and_repeated_vertices_are_not_corners() {
+        let stroke = polyline(&[(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (5.0, 0.0), (5.0, 3.0)]);
+        let sections = sections(&stroke, &EXACT);
+        assert_eq!(sections.len(), 2);
+        let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(5.0, 0.0)));
+        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2 }]);
+    }
+
+    #[test]
+    fn a_reversal_is_a_stop_even_where_corners_are_blended() {
+        let budget = Budget { blend: 0.1, ..EXACT };
+        assert_eq!(sections(&polyline(&[(0.0, 0.0), (5.0, 0.0), (2.0, 0.0)]), &budget).len(), 2);
+    }
+
+    #[test]
+    fn a_tangent_arc_goes_on_in_the_same_section() {
+        let mut stroke = polyline(&[(0.0, 0.0), (5.0, 0.0)]);
+        let down = -std::f64::consts::FRAC_PI_2;
+        stroke.arc(EllipticArc::circular(Point::new(5.0, 2.0), 2.0, down, 1.0));
+        assert_eq!(sections(&stroke, &EXACT).len(), 1);
+    }
+
+    #[test]
+    fn a_flat_ellipse_turns_back_at_its_ends() {
+        let mut stroke = Stroke::new(Pen(1), Point::new(4.0, 0.0), Span::default());
+        stroke.arc(EllipticArc {
+            center: Point::ZERO,
+            a: Vec2::new(4.0, 0.0),
+            b: Vec2::ZERO,
+            start: 0.0,
+            sweep: std::f64::consts::TAU,
+        });
+        let sections = sections(&stroke, &EXACT);
+        assert_eq!(sections.len(), 2);
+        assert!((sections[0][0].curve.end().x + 4.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_dot_has_no_sections() {
+        assert!(sections(&polyline(&[(1.0, 1.0)]), &EXACT).is_empty());
+        assert!(sections(&polyline(&[(1.0, 1.0), (1.0, 1.0)]), &EXACT).is_empty());
+    }
+
+    #[test]
+    fn a_chord_of_a_circle_runs_like_the_circle() {
+        let points: Vec<(f64, f64)> =
+            (0..=60).map(|k| libm::sincos(f64::from(k) * 0.05)).map(|(s, c)| (20.0 * c, 20.0 * s)).collect();
+        let sections = sections(&polyline(&points), &Budget { blend: 0.05, ..EXACT });
+        assert_eq!(sections.len(), 1);
+        // Neighbouring blends share their segments whole: nothing but the very ends stays straight.
+        let straight: f64 = sections[0]
+            .iter()
+            .filter(|piece| matches!(piece.curve, Segment::Line(_)))
+            .map(Piece::length)
+            .sum();
+        assert!(straight < 1.01, "{straight}");
+    }
+}
