@@ -129,11 +129,15 @@ codes! {
         "EP or FP asks for a polygon, but the polygon buffer holds none."
     LABEL_NOT_DRAWN = 220 "H0220" Error "label not drawn"
         "The text of a label is not drawn."
-    FILL_NOT_DRAWN = 221 "H0221" Error "fill not drawn"
-        "An area is filled by this command. Only its outline is drawn."
+    FILL_REPLACED = 221 "H0221" Warning "raster fill replaced by a hatch"
+        "FT11 and FT22 fill areas with a raster of dots that only printers have. A pen draws lines: a hatch that covers \
+         about a quarter of the paper is drawn instead."
     ONLY_INK_WITHOUT_PEN = 222 "H0222" Warning "drawing without a pen throughout"
         "The file puts the pen away (SP0) and then draws all that it draws. On a plotter with pens in a carousel the \
          sheet would stay empty; what is meant is a pen that somebody put into the holder, so that pen 1 is taken."
+    TOO_MANY_PIECES = 223 "H0223" Error "pattern too fine"
+        "A hatch or a line pattern is so fine for the area or the line that it would come to millions of pieces. The \
+         area is not filled, the line is drawn solid. As a rule the scale or the spacing is not what was meant."
 }
 
 #[cfg(test)]

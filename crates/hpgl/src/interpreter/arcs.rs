@@ -21,7 +21,7 @@ fn sincos_degrees(degrees: f64) -> (f64, f64) {
     }
 }
 
-fn turned(v: Vec2, degrees: f64) -> Vec2 {
+pub(super) fn turned(v: Vec2, degrees: f64) -> Vec2 {
     let (sin, cos) = sincos_degrees(degrees);
     Vec2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
 }
@@ -258,15 +258,9 @@ impl Interpreter {
 
     /// Draws a closed path in current units around the pen, which stays where it is and as it is.
     fn edge(&mut self, path: &[Segment]) {
-        if self.is_sane_path(path) {
-            self.ink();
-            let map = self.frame.user_to_mm();
-            self.tracer.finish();
-            for segment in path {
-                self.tracer.segment(&segment.transformed(map));
-            }
-            self.tracer.finish();
-        }
+        self.ink();
+        let map = self.frame.user_to_mm();
+        self.tracer.outline(path.iter().map(|segment| (segment.transformed(map), true)));
     }
 
     /// The polygon buffer keeps the last shape, so that `EP` and `FP` can use it again.
@@ -298,7 +292,7 @@ impl Interpreter {
                 let outline: Vec<Segment> = path.iter().map(|segment| segment.transformed(map)).collect();
                 self.polygon.add_outline(&outline);
             }
-        } else {
+        } else if self.is_sane_path(&path) {
             self.edge(&path);
         }
     }
@@ -323,7 +317,7 @@ impl Interpreter {
     }
 
     /// Whether a polygon is not being defined; within one, shapes are not allowed.
-    fn leaves_polygons_alone(&mut self) -> bool {
+    pub(super) fn leaves_polygons_alone(&mut self) -> bool {
         if self.polygon.is_open() {
             let mnemonic = self.mnemonic;
             self.report(codes::NOT_IN_POLYGON, || format!("`{mnemonic}` is not allowed in a polygon"));
@@ -334,9 +328,11 @@ impl Interpreter {
     fn edge_rectangle(&mut self, corner: Option<Point>) {
         if let Some(corner) = corner {
             let path = self.rectangle(corner);
-            self.tracer.discard_dot();
-            self.keep(&path);
-            self.edge(&path);
+            if self.is_sane_path(&path) {
+                self.tracer.discard_dot();
+                self.keep(&path);
+                self.edge(&path);
+            }
         }
     }
 
@@ -350,16 +346,24 @@ impl Interpreter {
         self.edge_rectangle(corner);
     }
 
+    fn fill_rectangle(&mut self, corner: Option<Point>) {
+        if let Some(corner) = corner {
+            let path = self.rectangle(corner);
+            if self.is_sane_path(&path) {
+                self.keep(&path);
+                self.fill_outlines(false);
+            }
+        }
+    }
+
     pub(super) fn fill_rectangle_absolute(&mut self, p: &[f64]) {
         let corner = self.corner(p, false);
-        self.edge_rectangle(corner);
-        self.report(codes::FILL_NOT_DRAWN, || "the rectangle is not filled".into());
+        self.fill_rectangle(corner);
     }
 
     pub(super) fn fill_rectangle_relative(&mut self, p: &[f64]) {
         let corner = self.corner(p, true);
-        self.edge_rectangle(corner);
-        self.report(codes::FILL_NOT_DRAWN, || "the rectangle is not filled".into());
+        self.fill_rectangle(corner);
     }
 
     /// The outline of a wedge about the pen: radius, start angle, sweep. A whole turn is a circle without radii.
@@ -385,17 +389,20 @@ impl Interpreter {
     }
 
     pub(super) fn edge_wedge(&mut self, p: &[f64]) {
-        if let Some(path) = self.wedge(p) {
+        if let Some(path) = self.wedge(p)
+            && self.is_sane_path(&path)
+        {
             self.keep(&path);
             self.edge(&path);
         }
     }
 
     pub(super) fn fill_wedge(&mut self, p: &[f64]) {
-        if let Some(path) = self.wedge(p) {
+        if let Some(path) = self.wedge(p)
+            && self.is_sane_path(&path)
+        {
             self.keep(&path);
-            self.edge(&path);
-            self.report(codes::FILL_NOT_DRAWN, || "the wedge is not filled".into());
+            self.fill_outlines(false);
         }
     }
 }

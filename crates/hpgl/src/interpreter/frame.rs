@@ -211,6 +211,16 @@ impl Frame {
         self.user_to_mm
     }
 
+    /// Size of a plotter unit, mm.
+    pub(crate) fn unit_mm(&self) -> f64 {
+        self.unit_mm
+    }
+
+    /// The direction on the page of an angle in the turned frame, degrees.
+    pub(crate) fn direction_mm(&self, degrees: f64) -> Vec2 {
+        super::fill::direction_under(self.plu_to_mm, degrees)
+    }
+
     /// P1 and P2, plotter units.
     pub(crate) fn points(&self) -> (Point, Point) {
         (self.p1, self.p2)

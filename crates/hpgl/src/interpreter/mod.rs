@@ -1,10 +1,13 @@
 //! From commands to ink: the state of a plotter, and what each command does to it.
 
 mod arcs;
+mod fill;
 mod frame;
+mod line_type;
 mod pages;
 mod polygon;
 mod setup;
+mod ticks;
 mod tracer;
 mod travel;
 
@@ -15,8 +18,11 @@ use crate::diagnostics::{Code, Findings};
 use crate::profile::Options;
 use crate::syntax::{Command, Mnemonic, Syntax};
 use crate::{Page, Reading, Summary};
+use fill::FillType;
 use frame::Frame;
+use line_type::LineType;
 use polygon::Polygon;
+use ticks::Ticks;
 use tracer::Tracer;
 
 /// Gives the commands of a file their meaning.
@@ -34,6 +40,10 @@ pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Reading {
     findings.place(placed, interpreter.pen_position());
     interpreter.finish(syntax.command_count, findings)
 }
+
+/// How many hatch lines, and how many dashes, a file can come to: more than any sheet takes, and little enough to hold. A
+/// few bytes must not ask for more than a machine has.
+const MOST_PIECES: u64 = 10_000_000;
 
 /// Which pen the plotter holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +70,11 @@ pub(crate) struct Interpreter {
     position_mm: Point,
     tracer: Tracer,
     polygon: Polygon,
+    fill: FillType,
+    line_type: LineType,
+    ticks: Ticks,
+    /// How many hatch lines may still be drawn.
+    pieces_left: u64,
     pages: Vec<Page>,
     findings: Findings,
     /// How often each command occurred, by the index of its letters.
@@ -83,6 +98,10 @@ impl Interpreter {
             position_mm,
             tracer: Tracer::new(),
             polygon: Polygon::default(),
+            fill: FillType::default(),
+            line_type: LineType::default(),
+            ticks: Ticks::default(),
+            pieces_left: MOST_PIECES,
             pages: Vec::new(),
             findings: Findings::default(),
             used: vec![0; 26 * 26],
@@ -156,6 +175,14 @@ impl Interpreter {
             b"PM" => self.polygon_mode(p),
             b"EP" => self.edge_polygon(),
             b"FP" => self.fill_polygon(p),
+            b"FT" => self.fill_type(p),
+            b"AC" => self.anchor_corner(p),
+            b"PT" => self.pen_thickness(p),
+            b"LT" => self.line_type(p),
+            b"UL" => self.user_line_type(p),
+            b"TL" => self.tick_length(p),
+            b"XT" => self.x_tick(),
+            b"YT" => self.y_tick(),
             b"SP" => self.select_pen(p),
             b"IN" => self.initialise(),
             b"DF" => self.set_defaults(),
@@ -181,6 +208,7 @@ impl Interpreter {
             _ if mnemonic == Mnemonic::PICTURE_FRAME => self.picture_frame(p),
             _ => {}
         }
+        self.report_given_up_dashes();
         for _ in 0..self.tracer.take_clipped() {
             self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
         }

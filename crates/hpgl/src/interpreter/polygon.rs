@@ -133,30 +133,17 @@ impl Interpreter {
             return;
         }
         self.ink();
-        self.draw_outlines();
-    }
-
-    /// Draws the outlines in the buffer.
-    pub(super) fn draw_outlines(&mut self) {
-        self.tracer.finish();
         for outline in self.polygon.outlines() {
-            for (segment, down) in &outline.pieces {
-                if *down {
-                    self.tracer.segment(segment);
-                } else {
-                    self.tracer.finish();
-                }
-            }
-            self.tracer.finish();
+            self.tracer.outline(outline.pieces.iter().copied());
         }
     }
 
-    /// `FP`.
-    pub(super) fn fill_polygon(&mut self, _p: &[f64]) {
+    /// `FP`: fills the outlines; 0 by parity, 1 by winding.
+    pub(super) fn fill_polygon(&mut self, p: &[f64]) {
         if self.polygon.outlines().is_empty() {
             self.report(codes::EMPTY_POLYGON, || "there is no polygon to fill".into());
             return;
         }
-        self.report(codes::FILL_NOT_DRAWN, || "the polygon is not filled".into());
+        self.fill_outlines(p.first() == Some(&1.0));
     }
 }

@@ -2,7 +2,10 @@
 
 use drawing::{Point, Vec2};
 
+use super::fill::FillType;
 use super::frame::{Rotation, Scale};
+use super::line_type::LineType;
+use super::ticks::Ticks;
 use super::{Holder, Interpreter};
 use crate::codes;
 
@@ -20,6 +23,10 @@ impl Interpreter {
             self.holder = Holder::Unsaid;
         }
         self.polygon.clear();
+        self.fill = FillType::default();
+        self.line_type = LineType::default();
+        self.ticks = Ticks::default();
+        self.tracer.set_dashes(None);
         self.frame.initialise();
         self.tracer.set_clip(self.frame.clip());
         self.place(Point::ZERO);
@@ -30,6 +37,10 @@ impl Interpreter {
         self.relative = false;
         self.chords_by_deviation = false;
         self.polygon.clear();
+        self.fill = FillType::with_pen(self.fill.pen_thickness);
+        self.line_type = LineType::default();
+        self.ticks = Ticks::default();
+        self.tracer.set_dashes(None);
         self.frame.set_defaults();
         self.tracer.set_clip(self.frame.clip());
     }
@@ -40,7 +51,7 @@ impl Interpreter {
         match *p {
             [] => {
                 self.frame.reset_points();
-                self.tracer.set_clip(self.frame.clip());
+                self.frame_changed();
             }
             [x, y] => self.set_points(Point::new(x, y), Point::new(x, y) + (p2 - p1)),
             [x1, y1, x2, y2] => self.set_points(Point::new(x1, y1), Point::new(x2, y2)),
@@ -69,7 +80,13 @@ impl Interpreter {
                 "P1 and P2 coincide on an axis; P2 is moved by one plotter unit".into()
             });
         }
+        self.frame_changed();
+    }
+
+    /// What hangs on the frame: the window, and the line pattern, whose length follows P1 and P2 and which begins anew.
+    fn frame_changed(&mut self) {
         self.tracer.set_clip(self.frame.clip());
+        self.apply_line_type();
     }
 
     /// `SC`: user units. The pen stays where it is.
@@ -102,7 +119,7 @@ impl Interpreter {
             return;
         }
         self.frame.set_scale(scale);
-        self.tracer.set_clip(self.frame.clip());
+        self.frame_changed();
     }
 
     /// `RO`: turns the frame by quarters. The pen stays where it is on the paper.
@@ -114,7 +131,7 @@ impl Interpreter {
         self.tracer.finish();
         let position = self.frame.rotate(rotation, self.position);
         self.place(position);
-        self.tracer.set_clip(self.frame.clip());
+        self.frame_changed();
     }
 
     /// `IW`: the window that ink is clipped to.
@@ -132,7 +149,7 @@ impl Interpreter {
                 return;
             }
         }
-        self.tracer.set_clip(self.frame.clip());
+        self.frame_changed();
     }
 
     /// `PS`: the page of HP-GL/2, or the paper format of HP-GL plotters.
@@ -155,7 +172,7 @@ impl Interpreter {
     fn set_page(&mut self, length: f64, width: Option<f64>) {
         self.tracer.finish();
         self.frame.set_page(length, width);
-        self.tracer.set_clip(self.frame.clip());
+        self.frame_changed();
         self.place(self.position);
     }
 

@@ -1,6 +1,8 @@
 //! The pen on the paper: joins pen-down movement to strokes, clipped to the window; mm.
 
-use drawing::{Pen, Point, Rect, Segment, Span, Stroke, clip_segment};
+use drawing::{Line, Pen, Point, Rect, Segment, Span, Stroke, clip_segment};
+
+use super::line_type::{Dash, Dashes};
 
 /// Steps shorter than this (mm) are rounding, not movement.
 const NO_STEP: f64 = 1e-9;
@@ -26,6 +28,10 @@ pub(crate) struct Tracer {
     /// The pen came down at the only point so far: it leaves a dot.
     dot: bool,
     clip: Option<Rect>,
+    dashes: Option<Dashes>,
+    /// How many dashes may still be drawn, in all the file, and whether that was too few.
+    dashes_left: f64,
+    given_up: bool,
     /// How often ink was cut off since this was last looked at.
     clipped: u64,
 }
@@ -41,6 +47,9 @@ impl Tracer {
             source: Span::default(),
             dot: false,
             clip: None,
+            dashes: None,
+            dashes_left: super::MOST_PIECES as f64,
+            given_up: false,
             clipped: 0,
         }
     }
@@ -65,6 +74,24 @@ impl Tracer {
             self.finish();
             self.clip = clip;
         }
+    }
+
+    /// Draws with that line pattern from now on, from its beginning.
+    pub(crate) fn set_dashes(&mut self, dashes: Option<Dashes>) {
+        if dashes.is_some() || self.dashes.is_some() {
+            self.finish();
+            self.dashes = dashes;
+        }
+    }
+
+    /// Draws with that line pattern from now on, as far as it has come, and gives the one before back.
+    pub(crate) fn swap_dashes(&mut self, dashes: Option<Dashes>) -> Option<Dashes> {
+        std::mem::replace(&mut self.dashes, dashes)
+    }
+
+    /// Whether lines were drawn solid because dashes would have been too many, since this was last asked.
+    pub(crate) fn take_given_up(&mut self) -> bool {
+        std::mem::take(&mut self.given_up)
     }
 
     pub(crate) fn take_clipped(&mut self) -> u64 {
@@ -111,13 +138,28 @@ impl Tracer {
     /// Draws a straight line.
     #[inline]
     pub(crate) fn line(&mut self, from: Point, to: Point) {
-        if let Some(clip) = self.clip
-            && !(holds(clip, from) && holds(clip, to))
-        {
-            self.segment(&Segment::Line(drawing::Line::new(from, to)));
-            return;
+        if self.dashes.is_some() || self.clip.is_some_and(|clip| !(holds(clip, from) && holds(clip, to))) {
+            self.segment(&Segment::Line(Line::new(from, to)));
+        } else {
+            self.append_line(from, to);
         }
-        self.append_line(from, to);
+    }
+
+    /// Draws an outline by itself: its pieces, as far as their pen is down. The line pattern begins anew, and goes on
+    /// afterwards where it was.
+    pub(crate) fn outline(&mut self, pieces: impl Iterator<Item = (Segment, bool)>) {
+        self.finish();
+        let dashes = self.dashes.clone();
+        self.dashes = dashes.as_ref().map(Dashes::restarted);
+        for (segment, down) in pieces {
+            if down {
+                self.segment(&segment);
+            } else {
+                self.finish();
+            }
+        }
+        self.finish();
+        self.dashes = dashes;
     }
 
     #[inline]
@@ -153,6 +195,26 @@ impl Tracer {
 
     /// Draws a line, an arc or a curve.
     pub(crate) fn segment(&mut self, segment: &Segment) {
+        let Some(mut dashes) = self.dashes.take() else {
+            self.solid(segment);
+            return;
+        };
+        let count = dashes.pieces_along(segment.length());
+        if count > self.dashes_left {
+            self.given_up = true;
+            self.solid(segment);
+        } else {
+            self.dashes_left -= count;
+            self.discard_dot();
+            dashes.cut(segment, |dash| match dash {
+                Dash::Piece(piece) => self.solid(&piece),
+                Dash::Dot(at) => self.dot(at),
+            });
+        }
+        self.dashes = Some(dashes);
+    }
+
+    fn solid(&mut self, segment: &Segment) {
         let Some(clip) = self.clip else {
             self.append(segment);
             return;
