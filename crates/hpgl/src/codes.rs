@@ -127,8 +127,10 @@ codes! {
          drawn by itself."
     EMPTY_POLYGON = 218 "H0218" Note "empty polygon"
         "EP or FP asks for a polygon, but the polygon buffer holds none."
-    LABEL_NOT_DRAWN = 220 "H0220" Error "label not drawn"
-        "The text of a label is not drawn."
+    UNKNOWN_CHARACTER = 220 "H0220" Error "character not drawn"
+        "A character of a label or a symbol is not in the built-in stroke font, or its byte stands for none in the character \
+         set. Its place stays empty. The font has the Latin alphabets, Greek letters and the signs of the sets that \
+         plotters knew; other scripts should be converted to outlines or strokes before."
     FILL_REPLACED = 221 "H0221" Warning "raster fill replaced by a hatch"
         "FT11 and FT22 fill areas with a raster of dots that only printers have. A pen draws lines: a hatch that covers \
          about a quarter of the paper is drawn instead."
@@ -138,6 +140,9 @@ codes! {
     TOO_MANY_PIECES = 223 "H0223" Error "pattern too fine"
         "A hatch or a line pattern is so fine for the area or the line that it would come to millions of pieces. The \
          area is not filled, the line is drawn solid. As a rule the scale or the spacing is not what was meant."
+    UNKNOWN_CHARACTER_SET = 224 "H0224" Note "character set not known"
+        "CS, CA, SD or AD names a character set that is not built in. ISO 8859-1 is taken; bytes above 127, and a few signs \
+         below, may come out as other characters than were meant."
 }
 
 #[cfg(test)]

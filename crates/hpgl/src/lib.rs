@@ -19,6 +19,7 @@ mod diagnostics;
 mod emit;
 mod encoded;
 mod envelope;
+mod fonts;
 mod interpreter;
 mod lexer;
 mod mnemonics;
@@ -73,7 +74,7 @@ pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {
 /// The result is the same as that of [`interpret`] on [`parse`].
 pub fn read(bytes: &[u8], options: &Options) -> Reading {
     let mut parser = parser::Parser::new(bytes, options.label_terminator);
-    let mut interpreter = interpreter::Interpreter::new(options);
+    let mut interpreter = interpreter::Interpreter::new(options, bytes.len());
     let mut placed = 0;
     loop {
         let before = interpreter.pen_position();

@@ -1,8 +1,10 @@
 //! From commands to ink: the state of a plotter, and what each command does to it.
 
 mod arcs;
+mod characters;
 mod fill;
 mod frame;
+mod label;
 mod line_type;
 mod pages;
 mod polygon;
@@ -18,6 +20,8 @@ use crate::diagnostics::{Code, Findings};
 use crate::profile::Options;
 use crate::syntax::{Command, Mnemonic, Syntax};
 use crate::{Page, Reading, Summary};
+use crate::fonts::Glyph;
+use characters::Characters;
 use fill::FillType;
 use frame::Frame;
 use line_type::LineType;
@@ -27,7 +31,7 @@ use tracer::Tracer;
 
 /// Gives the commands of a file their meaning.
 pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Reading {
-    let mut interpreter = Interpreter::new(options);
+    let mut interpreter = Interpreter::new(options, syntax.bytes.len());
     let mut findings = syntax.findings.clone();
     let mut placed = 0;
     for (command, found) in syntax.commands().zip(syntax.findings_until()) {
@@ -41,9 +45,10 @@ pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Reading {
     interpreter.finish(syntax.command_count, findings)
 }
 
-/// How many hatch lines, and how many dashes, a file can come to: more than any sheet takes, and little enough to hold. A
-/// few bytes must not ask for more than a machine has.
-const MOST_PIECES: u64 = 10_000_000;
+/// How many hatch lines, and how many dashes, a file can come to: enough for a large sheet filled solid, and little enough to
+/// hold. A few bytes must not ask for more than a machine has.
+const PIECES_FOR_NOTHING: u64 = 200_000;
+const PIECES_A_BYTE: u64 = 4;
 
 /// Which pen the plotter holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +78,15 @@ pub(crate) struct Interpreter {
     fill: FillType,
     line_type: LineType,
     ticks: Ticks,
+    characters: Characters,
+    /// Where carriage returns lead, plotter units.
+    margin: Point,
+    /// Where the last label left the pen: if it is elsewhere, it has moved since.
+    label_end: Option<Point>,
+    /// What `BL` kept, and where it stands in the file.
+    label_buffer: (Vec<u8>, usize),
+    /// The symbol to draw at every point.
+    symbol: Option<Glyph>,
     /// How many hatch lines may still be drawn.
     pieces_left: u64,
     pages: Vec<Page>,
@@ -85,7 +99,9 @@ pub(crate) struct Interpreter {
 }
 
 impl Interpreter {
-    pub(crate) fn new(options: &Options) -> Self {
+    /// A plotter for a file of that many bytes.
+    pub(crate) fn new(options: &Options, length: usize) -> Self {
+        let pieces = PIECES_FOR_NOTHING + PIECES_A_BYTE * length as u64;
         let frame = Frame::new(options);
         let position_mm = frame.mm_of_plu(Point::ZERO);
         Self {
@@ -96,12 +112,17 @@ impl Interpreter {
             chords_by_deviation: false,
             position: Point::ZERO,
             position_mm,
-            tracer: Tracer::new(),
+            tracer: Tracer::new(pieces as f64),
             polygon: Polygon::default(),
             fill: FillType::default(),
             line_type: LineType::default(),
             ticks: Ticks::default(),
-            pieces_left: MOST_PIECES,
+            characters: Characters::default(),
+            margin: Point::ZERO,
+            label_end: None,
+            label_buffer: (Vec::new(), 0),
+            symbol: None,
+            pieces_left: pieces,
             pages: Vec::new(),
             findings: Findings::default(),
             used: vec![0; 26 * 26],
@@ -194,12 +215,26 @@ impl Interpreter {
             b"PS" => self.page_size(p),
             b"PG" | b"AF" | b"AH" | b"FR" => self.advance_page(),
             b"BP" => self.begin_plot(),
-            b"LB" | b"BL" => {
-                let text = command.text;
-                self.report(codes::LABEL_NOT_DRAWN, || {
-                    format!("the label `{}` is not drawn", text.escape_ascii())
-                });
-            }
+            b"LB" => self.label(command.text, command.text_span.start),
+            b"BL" => self.buffer_label(command.text, command.text_span.start),
+            b"PB" => self.print_buffer(),
+            b"CP" => self.character_plot(p),
+            b"SM" => self.symbol_mode(command.text, command.text_span.start),
+            b"UC" => self.user_character(p),
+            b"SI" => self.size_absolute(p),
+            b"SR" => self.size_relative(p),
+            b"DI" => self.direction_absolute(p),
+            b"DR" => self.direction_relative(p),
+            b"SL" => self.slant(p),
+            b"ES" => self.extra_space(p),
+            b"LO" => self.label_origin(p),
+            b"DV" => self.text_path(p),
+            b"CS" => self.character_set(p, false),
+            b"CA" => self.character_set(p, true),
+            b"SD" => self.font_definition(p, false),
+            b"AD" => self.font_definition(p, true),
+            b"SS" => self.select_font(false),
+            b"SA" => self.select_font(true),
             b"OA" | b"OC" | b"OD" | b"OE" | b"OF" | b"OG" | b"OH" | b"OI" | b"OK" | b"OL" | b"OO" | b"OP"
             | b"OS" | b"OT" | b"OW" | b"DP" | b"DC" => {
                 self.report(codes::OUTPUT_COMMAND, || format!("`{mnemonic}` has no meaning in a file"));

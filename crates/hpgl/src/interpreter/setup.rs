@@ -2,6 +2,7 @@
 
 use drawing::{Point, Vec2};
 
+use super::characters::Characters;
 use super::fill::FillType;
 use super::frame::{Rotation, Scale};
 use super::line_type::LineType;
@@ -26,6 +27,8 @@ impl Interpreter {
         self.fill = FillType::default();
         self.line_type = LineType::default();
         self.ticks = Ticks::default();
+        self.characters = Characters::default();
+        self.symbol = None;
         self.tracer.set_dashes(None);
         self.frame.initialise();
         self.tracer.set_clip(self.frame.clip());
@@ -40,6 +43,8 @@ impl Interpreter {
         self.fill = FillType::with_pen(self.fill.pen_thickness);
         self.line_type = LineType::default();
         self.ticks = Ticks::default();
+        self.characters = Characters::default();
+        self.symbol = None;
         self.tracer.set_dashes(None);
         self.frame.set_defaults();
         self.tracer.set_clip(self.frame.clip());

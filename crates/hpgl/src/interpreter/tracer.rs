@@ -37,7 +37,8 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
-    pub(crate) fn new() -> Self {
+    /// With so many dashes at the most.
+    pub(crate) fn new(dashes_left: f64) -> Self {
         Self {
             strokes: Vec::new(),
             pen: Pen(1),
@@ -48,7 +49,7 @@ impl Tracer {
             dot: false,
             clip: None,
             dashes: None,
-            dashes_left: super::MOST_PIECES as f64,
+            dashes_left,
             given_up: false,
             clipped: 0,
         }

@@ -53,10 +53,15 @@ impl Interpreter {
         if pairs.len() == 0 {
             return;
         }
-        if self.polygon.is_open() || !self.down {
+        if self.polygon.is_open() || !self.down || self.symbol.is_some() {
             for pair in pairs {
                 let to = self.target(self.position, pair[0], pair[1]);
                 self.go(to);
+                if let Some(symbol) = self.symbol
+                    && !self.polygon.is_open()
+                {
+                    self.draw_symbol(symbol);
+                }
             }
             return;
         }

@@ -1,0 +1,135 @@
+//! Character sets: what the bytes of labels stand for.
+
+/// A set of characters for the bytes of labels. The first half is ASCII in all of them, but for the ISO 646 variants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum CharacterSet {
+    /// Code page 1252, which holds ISO 8859-1: what files without a word about it are written in today.
+    #[default]
+    Latin1,
+    /// HP's own 8-bit set.
+    Roman8,
+    /// Code page 437 of the IBM PC.
+    CodePage437,
+    /// Code page 850.
+    CodePage850,
+    /// ISO 646 with letters of a language in the places of `#$@[\\]^`{|}~`.
+    Iso646(&'static str),
+}
+
+/// The places in ASCII that ISO 646 leaves to national letters.
+const NATIONAL: &[u8] = b"#$@[\\]^`{|}~";
+
+impl CharacterSet {
+    /// The set of a 7475A's `CS` and `CA`, if it is known here.
+    ///
+    /// The numbers of national sets follow ISO 646 registrations: 30 Swedish, 31 the same for names, 32 Norwegian, 33
+    /// German, 34 French, 35 British, 36 Italian, 37 Spanish, 38 Portuguese, 39 Norwegian 2.
+    pub(crate) fn of_plotter(number: f64) -> Option<Self> {
+        Some(match number as i32 {
+            0 | 6 | 9 => Self::Latin1,
+            7 => Self::Roman8,
+            30 => Self::Iso646("#¤@ÄÖÅ^`äöå~"),
+            31 => Self::Iso646("#¤ÉÄÖÅÜéäöåü"),
+            32 | 39 => Self::Iso646("#$@ÆØÅ^`æøå~"),
+            33 => Self::Iso646("#$§ÄÖÜ^`äöüß"),
+            34 => Self::Iso646("£$à°ç§^µéùè¨"),
+            35 => Self::Iso646("£$@[\\]^`{|}~"),
+            36 => Self::Iso646("£$§°çé^ùàòèì"),
+            37 => Self::Iso646("£$§¡Ñ¿^`°ñç~"),
+            38 => Self::Iso646("#$§ÃÇÕ^`ãçõ°"),
+            _ => return None,
+        })
+    }
+
+    /// The set of HP-GL/2's `SD1,n` and `AD1,n`, if it is known here. A symbol set that PCL calls `8U` is 8 * 32 + 21: the
+    /// number and the place of the letter after `@`.
+    pub(crate) fn of_symbol_set(value: f64) -> Option<Self> {
+        Some(match value as i32 {
+            // 0U ASCII, 0N ECMA-94 Latin 1, 19U and 9U Windows
+            21 | 14 | 629 | 309 => Self::Latin1,
+            277 => Self::Roman8,
+            // 10U, and 11U with other box drawings
+            341 | 373 => Self::CodePage437,
+            // 12U
+            405 => Self::CodePage850,
+            // 0S and 3S, 0D and 1D, 1G, 1F, 1E, 0I, 2S
+            19 => Self::Iso646("#¤@ÄÖÅ^`äöå~"),
+            4 | 36 => Self::Iso646("#$@ÆØÅ^`æøå~"),
+            39 => Self::Iso646("#$§ÄÖÜ^`äöüß"),
+            38 => Self::Iso646("£$à°ç§^µéùè¨"),
+            37 => Self::Iso646("£$@[\\]^`{|}~"),
+            9 => Self::Iso646("£$§°çé^ùàòèì"),
+            83 => Self::Iso646("£$§¡Ñ¿^`°ñç~"),
+            _ => return None,
+        })
+    }
+
+    /// The character of a byte that is none of the control bytes; the replacement character where there is none.
+    pub(crate) fn character(self, byte: u8) -> char {
+        let upper = match self {
+            Self::Iso646(letters) => {
+                let place = NATIONAL.iter().position(|&b| b == byte);
+                return place.and_then(|place| letters.chars().nth(place)).unwrap_or(char::from(byte & 0x7f));
+            }
+            Self::Latin1 => CODE_PAGE_1252,
+            Self::Roman8 => ROMAN_8,
+            Self::CodePage437 => CODE_PAGE_437,
+            Self::CodePage850 => CODE_PAGE_850,
+        };
+        if byte < 0x80 {
+            return char::from(byte);
+        }
+        upper.chars().nth(usize::from(byte - 0x80)).unwrap_or(char::REPLACEMENT_CHARACTER)
+    }
+}
+
+const CODE_PAGE_1252: &str = "\
+    €\u{fffd}‚ƒ„…†‡^‰Š‹Œ\u{fffd}Ž\u{fffd}\u{fffd}‘’“”•–—~™š›œ\u{fffd}žŸ\
+    \u{20}¡¢£¤¥¦§¨©ª«¬-®¯°±²³´µ¶·¸¹º»¼½¾¿\
+    ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÐÑÒÓÔÕÖ×ØÙÚÛÜÝÞß\
+    àáâãäåæçèéêëìíîïðñòóôõö÷øùúûüýþÿ";
+
+const ROMAN_8: &str = "\
+    \u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}\
+    \u{20}ÀÂÈÊËÎÏ´`^¨~ÙÛ₤¯Ýý°ÇçÑñ¡¿¤£¥§ƒ¢\
+    âêôûáéóúàèòùäëöüÅîØÆåíøæÄìÖÜÉïßÔ\
+    ÁÃãÐðÍÌÓÒÕõŠšÚŸÿÞþ·µ¶¾—¼½ªº«■»±\u{fffd}";
+
+const CODE_PAGE_437: &str = "\
+    ÇüéâäàåçêëèïîìÄÅÉæÆôöòûùÿÖÜ¢£¥₧ƒ\
+    áíóúñÑªº¿⌐¬½¼¡«»░▒▓│┤╡╢╖╕╣║╗╝╜╛┐\
+    └┴┬├─┼╞╟╚╔╩╦╠═╬╧╨╤╥╙╘╒╓╫╪┘┌█▄▌▐▀\
+    αßΓπΣσµτΦΘΩδ∞φε∩≡±≥≤⌠⌡÷≈°∙·√ⁿ²■ ";
+
+const CODE_PAGE_850: &str = "\
+    ÇüéâäàåçêëèïîìÄÅÉæÆôöòûùÿÖÜø£Ø×ƒ\
+    áíóúñÑªº¿®¬½¼¡«»░▒▓│┤ÁÂÀ©╣║╗╝¢¥┐\
+    └┴┬├─┼ãÃ╚╔╩╦╠═╬¤ðÐÊËÈıÍÎÏ┘┌█▄¦Ì▀\
+    ÓßÔÒõÕµþÞÚÛÙýÝ¯´-±‗¾¶§÷¸°¨·¹³²■ ";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_set_has_128_upper_places() {
+        for upper in [CODE_PAGE_1252, ROMAN_8, CODE_PAGE_437, CODE_PAGE_850] {
+            assert_eq!(upper.chars().count(), 128);
+        }
+    }
+
+    #[test]
+    fn the_same_letter_in_each_set() {
+        for (set, byte) in [
+            (CharacterSet::Latin1, 0xfc),
+            (CharacterSet::Roman8, 0xcf),
+            (CharacterSet::CodePage437, 0x81),
+            (CharacterSet::CodePage850, 0x81),
+            (CharacterSet::Iso646("#$§ÄÖÜ^`äöüß"), b'}'),
+        ] {
+            assert_eq!(set.character(byte), 'ü');
+            assert_eq!(set.character(b'A'), 'A');
+        }
+        assert_eq!(CharacterSet::Latin1.character(0x81), char::REPLACEMENT_CHARACTER);
+    }
+}

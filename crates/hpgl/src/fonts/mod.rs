@@ -1,0 +1,69 @@
+//! The stroke font that labels are drawn in, and the character sets of their bytes.
+
+mod encodings;
+mod newstroke;
+
+pub(crate) use encodings::CharacterSet;
+
+/// Height of capitals, units of the font.
+pub(crate) const CAP_HEIGHT: f64 = 21.0;
+/// Width of wide capitals such as A, units of the font: what plotters call the width of a character.
+pub(crate) const BODY_WIDTH: f64 = 14.0;
+
+/// A character as strokes. The base line is at 0, y goes up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Glyph {
+    /// From this character's origin to the next one's where characters have widths of their own.
+    pub(crate) advance: f64,
+    strokes: &'static str,
+}
+
+impl Glyph {
+    /// The glyph of a character, if the font has it.
+    pub(crate) fn of(character: char) -> Option<Self> {
+        let glyphs = newstroke::GLYPHS;
+        let index = glyphs.binary_search_by_key(&character, |glyph| glyph.0).ok()?;
+        let (_, advance, strokes) = glyphs[index];
+        Some(Self { advance: f64::from(advance), strokes })
+    }
+
+    /// Its strokes, each as points in units of the font.
+    pub(crate) fn strokes(self) -> impl Iterator<Item = impl Iterator<Item = (f64, f64)>> {
+        let unit = |byte: u8| f64::from(byte) - f64::from(b'R');
+        self.strokes
+            .split(' ')
+            .filter(|stroke| !stroke.is_empty())
+            .map(move |stroke| stroke.as_bytes().chunks_exact(2).map(move |pair| (unit(pair[0]), unit(pair[1]))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glyphs_are_in_order_and_whole() {
+        assert!(newstroke::GLYPHS.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        for &(character, advance, strokes) in newstroke::GLYPHS {
+            assert!(advance > 0, "{character}");
+            assert!(strokes.split(' ').all(|stroke| stroke.len() % 2 == 0), "{character}");
+        }
+    }
+
+    #[test]
+    fn every_printable_character_of_ascii_and_latin_1_has_one() {
+        for character in (' '..='~').chain('¡'..='ÿ').filter(|&c| c != '\u{ad}') {
+            assert!(Glyph::of(character).is_some(), "{character}");
+        }
+    }
+
+    #[test]
+    fn a_capital_stands_on_the_base_line() {
+        let glyph = Glyph::of('A').unwrap();
+        let points: Vec<(f64, f64)> = glyph.strokes().flatten().collect();
+        let height = points.iter().map(|p| p.1).fold(0.0, f64::max);
+        let width = points.iter().map(|p| p.0).fold(0.0, f64::max) - points.iter().map(|p| p.0).fold(99.0, f64::min);
+        assert_eq!((height, width), (CAP_HEIGHT, BODY_WIDTH));
+        assert_eq!(points.iter().map(|p| p.1).fold(0.0, f64::min), 0.0);
+    }
+}
