@@ -137,3 +137,87 @@ fn exceeds(value: f64, allowed: f64) -> Option<Excess> {
     let within = value <= allowed * ROUNDING;
     (!within).then_some(Excess { value, allowed })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::MotorCheck;
+
+    const PERIOD_US: u64 = 10_000;
+
+    /// 10,000 ticks/s and 100,000 ticks/s²: at 10 ms 100 + 1 ticks a step and 10 + 2 ticks a second difference.
+    fn motor() -> MotorCheck {
+        let limits = plan::Limits { speed: 1e4, acceleration: 1e5, jerk: None };
+        MotorCheck::new(plan::Motor { name: "m".into(), limits }, PERIOD_US)
+    }
+
+    /// Steps of one period each, then rest; whether any is too fast, and the first one that is too sudden.
+    fn run(steps: &[i64]) -> (bool, Option<usize>) {
+        let mut motor = motor();
+        let mut fast = false;
+        let mut sudden = None;
+        for (index, step) in steps.iter().enumerate() {
+            let (too_fast, too_sudden) = motor.step(PERIOD_US, *step);
+            fast |= too_fast.is_some();
+            sudden = sudden.or(too_sudden.map(|_| index));
+        }
+        (fast, sudden.or(motor.stop().map(|_| steps.len())))
+    }
+
+    #[test]
+    fn second_differences_up_to_twelve_ticks() {
+        assert_eq!(run(&[12, 24, 36, 24, 12]), (false, None));
+        assert_eq!(run(&[-12, 0, 12]), (false, None));
+        assert_eq!(run(&[13, 25, 13]), (false, Some(0)));
+        assert_eq!(run(&[12, 25, 13, 1]), (false, Some(1)));
+        assert_eq!(run(&[12, 24, 13]), (false, Some(3)));
+        // To and fro: 24 ticks, though no step is longer than a tick a millisecond.
+        assert_eq!(run(&[12, -12]), (false, Some(1)));
+    }
+
+    #[test]
+    fn first_differences_up_to_a_hundred_and_one_ticks() {
+        let ramp = |top: i64| {
+            (1..=8).map(|k| 12 * k).chain([top]).chain((1..=8).rev().map(|k| 12 * k)).collect::<Vec<_>>()
+        };
+        assert_eq!(run(&ramp(101)), (false, None));
+        assert_eq!(run(&ramp(102)), (true, None));
+    }
+
+    #[test]
+    fn a_thinned_standstill_is_no_gentle_stop() {
+        for gap in [1, 2, 500] {
+            let mut motor = motor();
+            assert!(motor.step(PERIOD_US, 12).1.is_none());
+            assert!(motor.step(gap * PERIOD_US, 0).1.is_none());
+            assert!(motor.step(PERIOD_US, 13).1.is_some(), "{gap}");
+            assert!(motor.step(gap * PERIOD_US, 0).1.is_some(), "{gap}");
+        }
+    }
+
+    #[test]
+    fn a_thinned_even_run_counts_as_its_rows() {
+        let mut motor = motor();
+        for step in [12, 24, 36] {
+            assert_eq!(motor.step(PERIOD_US, step), (None, None));
+        }
+        assert_eq!(motor.step(10 * PERIOD_US, 360), (None, None));
+        assert!(motor.step(PERIOD_US, 49).1.is_some());
+    }
+
+    #[test]
+    fn short_steps_are_judged_by_mean_speeds() {
+        let mut motor = motor();
+        assert_eq!(motor.step(PERIOD_US, 12), (None, None));
+        // 4 ms: 1e5 (10 + 4) ms / 2 + 1/10 ms + 1/4 ms = 1050 ticks/s more than 1200, so 9 ticks.
+        assert_eq!(motor.clone().step(4_000, 9), (None, None));
+        assert!(motor.step(4_000, 10).1.is_some());
+    }
+
+    #[test]
+    fn limits_that_are_no_numbers_are_broken() {
+        let limits = plan::Limits { speed: f64::NAN, acceleration: f64::NAN, jerk: None };
+        let mut motor = MotorCheck::new(plan::Motor { name: "m".into(), limits }, 0);
+        let (fast, sudden) = motor.step(1, 1);
+        assert!(fast.is_some() && sudden.is_some());
+    }
+}

@@ -614,3 +614,49 @@ fn better(known: [f64; 2], new: [f64; 2]) -> [f64; 2] {
 fn distance(a: Point, b: Point) -> f64 {
     (b - a).hypot2().sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{At, Chain, distance};
+    use drawing::{Point, Vec2};
+    use proptest::prelude::*;
+
+    fn to_segment(p: Point, from: Point, to: Point) -> f64 {
+        let along: Vec2 = to - from;
+        let t = if along.hypot2() > 0.0 { (p - from).dot(along) / along.hypot2() } else { 0.0 };
+        distance(p, from + t.clamp(0.0, 1.0) * along)
+    }
+
+    proptest! {
+        /// Every point that was merged is as near to the run as promised, the run's points to the path too.
+        #[test]
+        fn merged_points_stay_beside_their_run(
+            steps in prop::collection::vec((-0.1..1.0, -0.15..0.15), 1..60),
+            bend in -0.02..0.02,
+        ) {
+            let merge = 0.1;
+            let mut points = vec![Point::ZERO];
+            let mut chain = Chain::new(Point::ZERO, At { row: 0, t_us: 0 }, None, false);
+            for (index, (x, y)) in steps.iter().enumerate() {
+                let next = points[points.len() - 1] + Vec2::new(*x, y + bend * index as f64);
+                if !chain.extend(next, 0.0, merge, f64::INFINITY) {
+                    break;
+                }
+                points.push(next);
+            }
+            let run = chain.run(merge);
+            let allowed = if points.len() > 2 { merge } else { 0.0 } + 1e-9;
+            prop_assert!(run.error <= allowed);
+            prop_assert_eq!(run.to, points[points.len() - 1]);
+            for p in &points {
+                let off = to_segment(*p, run.from, run.to);
+                prop_assert!(off <= allowed, "{off} in {points:?}");
+            }
+            for k in 0..=100 {
+                let p = run.from.lerp(run.to, f64::from(k) / 100.0);
+                let off = points.windows(2).map(|pair| to_segment(p, pair[0], pair[1])).fold(f64::INFINITY, f64::min);
+                prop_assert!(off <= allowed, "{off} in {points:?}");
+            }
+        }
+    }
+}
