@@ -222,6 +222,7 @@ fn time(text: &str) -> Result<f64, String> {
 }
 
 fn place(text: &str) -> Result<(f64, f64), String> {
-    let (x, y) = text.split_once(',').ok_or("a place is two lengths with a comma between, such as 10mm,2cm")?;
+    let (x, y) =
+        text.split_once(',').ok_or("a place is two lengths with a comma between, such as 10mm,2cm")?;
     Ok((length(x)?, length(y)?))
 }

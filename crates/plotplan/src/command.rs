@@ -9,8 +9,8 @@ mod verify;
 
 use clap::CommandFactory as _;
 use kinematics::Machine;
-use plotplan::pipeline::Request;
 use planner::placement::{Size, Wish};
+use plotplan::pipeline::Request;
 
 use crate::cli::{Arguments, Command, Planning};
 use crate::failure::Failure;
@@ -27,7 +27,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
             let Some(code) = hpgl::Code::from_name(&explain.code) else {
-                let what = format!("there is no code {}; codes stand in brackets in diagnostics", explain.code);
+                let what =
+                    format!("there is no code {}; codes stand in brackets in diagnostics", explain.code);
                 return Err(Failure::Usage(anyhow::anyhow!(what)));
             };
             let text = format!("{code}: {} ({})\n\n{}\n", code.title(), code.severity(), code.explanation());

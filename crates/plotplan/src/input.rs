@@ -21,7 +21,11 @@ pub(crate) struct Input {
 pub(crate) fn read(file: &str) -> Result<Input, Failure> {
     if file == "-" {
         let mut bytes = Vec::new();
-        std::io::stdin().lock().read_to_end(&mut bytes).context("cannot read standard input").map_err(Failure::Io)?;
+        std::io::stdin()
+            .lock()
+            .read_to_end(&mut bytes)
+            .context("cannot read standard input")
+            .map_err(Failure::Io)?;
         return Ok(Input { name: "standard input".into(), bytes });
     }
     let bytes = std::fs::read(file).with_context(|| format!("cannot read {file}")).map_err(Failure::Io)?;
@@ -71,5 +75,7 @@ pub(crate) fn machine_toml(name: &str) -> Result<String, Failure> {
     let names: Vec<&str> = PRESETS.iter().map(|preset| preset.name).collect();
     let hint = nearest(name, names.iter().copied())
         .map_or_else(|| format!("there are {}", names.join(", ")), |near| format!("did you mean {near}?"));
-    Err(Failure::Usage(anyhow::anyhow!("there is no machine called {name}: {hint} (or give a machine file, NAME.toml)")))
+    Err(Failure::Usage(anyhow::anyhow!(
+        "there is no machine called {name}: {hint} (or give a machine file, NAME.toml)"
+    )))
 }

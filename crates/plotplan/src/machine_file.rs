@@ -136,9 +136,7 @@ impl<T> PerJoint<T> {
     fn of(&self, table: &str, geometry: &Geometry) -> Result<[Option<&T>; 2], MachineFileError> {
         let names = geometry.joint_names();
         let named = self.named();
-        if let Some((name, _)) =
-            named.iter().find(|(name, value)| value.is_some() && !names.contains(name))
-        {
+        if let Some((name, _)) = named.iter().find(|(name, value)| value.is_some() && !names.contains(name)) {
             return Err(MachineFileError::Invalid(format!(
                 "[{table}] names the joint {name}, but this geometry has {} and {}",
                 names[0], names[1]
@@ -261,9 +259,8 @@ impl MachineFile {
     /// When a value is not of the unit that its key wants, or the parts do not make a machine.
     pub fn machine(&self) -> Result<Machine, MachineFileError> {
         let geometry = self.geometry()?;
-        let dimensions = geometry
-            .joint_is_angle()
-            .map(|angle| if angle { Dimension::Angle } else { Dimension::Length });
+        let dimensions =
+            geometry.joint_is_angle().map(|angle| if angle { Dimension::Angle } else { Dimension::Length });
         let names = geometry.joint_names();
         let at = |key: String| move |source| MachineFileError::Quantity { key, source };
 
@@ -292,8 +289,7 @@ impl MachineFile {
                 self.motor.len()
             )));
         };
-        let length =
-            |text: &str, key: &str| quantity::length_mm(text, false).map_err(at(key.to_owned()));
+        let length = |text: &str, key: &str| quantity::length_mm(text, false).map_err(at(key.to_owned()));
         let time = |text: &str, key: &str| quantity::time_s(text).map_err(at(key.to_owned()));
         let (x, y) = (length(&self.sheet.x, "sheet.x")?, length(&self.sheet.y, "sheet.y")?);
         let (width, height) =
@@ -344,7 +340,8 @@ impl MotorTable {
             move |source| MachineFileError::Quantity { key, source }
         };
         let (counts, dimension) = quantity::counts(&self.counts).map_err(at("counts"))?;
-        let rate = |text: &str, power, key| quantity::rate_ticks(text, power, counts, dimension).map_err(at(key));
+        let rate =
+            |text: &str, power, key| quantity::rate_ticks(text, power, counts, dimension).map_err(at(key));
         Ok(Motor {
             name: self.name.clone(),
             counts,

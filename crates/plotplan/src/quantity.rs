@@ -49,7 +49,10 @@ impl Quantity {
         let size = units.iter().find(|(name, _)| *name == self.unit).map(|(_, size)| size);
         size.map(|size| self.value * size).ok_or_else(|| {
             let names: Vec<&str> = units.iter().map(|(name, _)| *name).collect();
-            QuantityError { text: text.into(), wanted: format!("{kind} (a number with {})", names.join(", ")) }
+            QuantityError {
+                text: text.into(),
+                wanted: format!("{kind} (a number with {})", names.join(", ")),
+            }
         })
     }
 }
@@ -128,7 +131,8 @@ pub fn counts(text: &str) -> Result<(f64, Dimension), QuantityError> {
     let ticks: f64 = ticks.trim().parse().map_err(|_| wrong())?;
     // `/mm` is `/1mm`.
     let per = per.trim();
-    let per = if per.starts_with(|c: char| c.is_ascii_alphabetic()) { format!("1{per}") } else { per.to_owned() };
+    let per =
+        if per.starts_with(|c: char| c.is_ascii_alphabetic()) { format!("1{per}") } else { per.to_owned() };
     for dimension in [Dimension::Length, Dimension::Angle] {
         if let Ok(size) = dimension.value(&per)
             && size > 0.0

@@ -34,7 +34,11 @@ pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
     let reading = input::drawing(&input, arguments.strict)?;
     let drawing = &reading.pages[0].drawing;
     if reading.pages.len() > 1 {
-        terminal::warning(&format!("{} has {} pages; only the first is taken", input.name, reading.pages.len()));
+        terminal::warning(&format!(
+            "{} has {} pages; only the first is taken",
+            input.name,
+            reading.pages.len()
+        ));
     }
     match machine {
         Some(machine) => plan(arguments, &input, drawing, &machine),
@@ -76,7 +80,9 @@ fn plan(
         ReportForm::Json => format!("{}\n", json!({ "summary": summary, "certificate": certificate })),
     };
     if !compiled.certificate.holds {
-        terminal::error("the plan does not hold its certificate and is not written; please report this drawing");
+        terminal::error(
+            "the plan does not hold its certificate and is not written; please report this drawing",
+        );
         terminal::say(&said);
         return Err(Failure::Refused);
     }
@@ -86,10 +92,7 @@ fn plan(
             Format::Csv => formats::csv::write(&compiled.header, rows(), out),
             Format::Json => {
                 let document = formats::json::Document {
-                    source: formats::json::Source {
-                        name: input.name.clone(),
-                        sha256: sha256(&input.bytes),
-                    },
+                    source: formats::json::Source { name: input.name.clone(), sha256: sha256(&input.bytes) },
                     machine: serde_json::to_value(&machine.file)?,
                     settings: report::settings(&request),
                     summary,
@@ -132,7 +135,9 @@ pub(super) fn explain(
     let PlanError::OutOfReach { stroke, pen, span, source } = &error else {
         return match error {
             PlanError::Setting { .. } => Failure::Usage(error.into()),
-            other => Failure::Drawing(anyhow::Error::new(other).context(format!("{} cannot be planned", input.name))),
+            other => Failure::Drawing(
+                anyhow::Error::new(other).context(format!("{} cannot be planned", input.name)),
+            ),
         };
     };
     let place_text = format!(
@@ -150,7 +155,10 @@ pub(super) fn explain(
     let help = match place(machine, drawing, &fit) {
         Ok(map) => {
             let [a, b, ..] = map.as_coeffs();
-            format!("--fit makes it fit, scaled by {:.4}; or choose --scale, --rotate and --place", libm::hypot(a, b))
+            format!(
+                "--fit makes it fit, scaled by {:.4}; or choose --scale, --rotate and --place",
+                libm::hypot(a, b)
+            )
         }
         Err(_) => "--scale, --rotate and --place move it".to_owned(),
     };

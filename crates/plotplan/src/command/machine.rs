@@ -35,7 +35,15 @@ fn check(file: &str) -> Result<String, Failure> {
         let _ = writeln!(
             text,
             "motor {}: {:.4} * ({} {} + {} {}) + {:.4} ticks, at most {:.1} ticks/s, {:.1} ticks/s2",
-            motor.name, motor.counts, row[0], joints[0], row[1], joints[1], motor.offset, motor.max_speed, motor.max_acceleration
+            motor.name,
+            motor.counts,
+            row[0],
+            joints[0],
+            row[1],
+            joints[1],
+            motor.offset,
+            motor.max_speed,
+            motor.max_acceleration
         );
     }
     let start = machine.ticks(&machine.start());

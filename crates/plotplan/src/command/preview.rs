@@ -59,13 +59,7 @@ fn of_drawing(input: &Input, arguments: &Preview) -> Result<Scene, Failure> {
     Ok(scene(&title, machine.sheet(), pipeline::reach_outlines(machine), &drawing, Some(start)))
 }
 
-fn scene(
-    title: &str,
-    sheet: Rect,
-    reach: Vec<Vec<Point>>,
-    drawing: &Drawing,
-    start: Option<Point>,
-) -> Scene {
+fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, start: Option<Point>) -> Scene {
     let ink = drawing
         .strokes
         .iter()
@@ -97,9 +91,14 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
         if pen != Some(pair[0].pen) {
             pen = Some(pair[0].pen);
             let start = vec![path[0]];
-            if pair[0].pen == 0 { travel.push(start) } else { ink.push(Ink { pen: pair[0].pen, points: start }) }
+            if pair[0].pen == 0 {
+                travel.push(start)
+            } else {
+                ink.push(Ink { pen: pair[0].pen, points: start })
+            }
         }
-        let line = if pair[0].pen == 0 { travel.last_mut() } else { ink.last_mut().map(|ink| &mut ink.points) };
+        let line =
+            if pair[0].pen == 0 { travel.last_mut() } else { ink.last_mut().map(|ink| &mut ink.points) };
         if let Some(line) = line {
             line.extend(path[1..].iter().filter(|point| Some(**point) != path.first().copied()));
         }
@@ -107,7 +106,14 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
     travel.retain(|line| line.len() > 1);
     let start = machine.geometry().forward(&machine.start());
     let title = format!("{} on {}", input.name, machine.name());
-    Ok(Scene { title, sheet: machine.sheet(), reach: pipeline::reach_outlines(machine), ink, travel, start: Some(start) })
+    Ok(Scene {
+        title,
+        sheet: machine.sheet(),
+        reach: pipeline::reach_outlines(machine),
+        ink,
+        travel,
+        start: Some(start),
+    })
 }
 
 /// The pen's path while the motors move linearly between two rows, in chords.
