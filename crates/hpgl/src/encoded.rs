@@ -176,21 +176,24 @@ impl Iterator for Decoder<'_> {
     fn next(&mut self) -> Option<Item> {
         loop {
             let (byte, length) = byte_at(self.bytes, self.at, self.reencoded)?;
-            let flag = if kind(byte) == Kind::Flag { byte & 0x7f } else { 0 };
-            if flag == 0 {
-                return match self.number() {
-                    Number::Value(value) => Some(Item::Coordinate(value * self.scale)),
-                    Number::Unfinished => Some(Item::Unfinished),
-                    Number::None => {
-                        if self.at >= self.bytes.len() {
-                            return None;
-                        }
-                        self.at += 1;
-                        continue;
-                    }
-                };
+            match kind(byte) {
+                Kind::Passed => {
+                    self.at += length;
+                    continue;
+                }
+                Kind::End => {
+                    self.at += envelope::device_control(&self.bytes[self.at..]).map_or(length, |c| c.bytes);
+                    continue;
+                }
+                Kind::Digit => {
+                    return match self.number() {
+                        Number::Value(value) => Some(Item::Coordinate(value * self.scale)),
+                        Number::Unfinished | Number::None => Some(Item::Unfinished),
+                    };
+                }
+                Kind::Flag => self.at += length,
             }
-            self.at += length;
+            let flag = byte & 0x7f;
             match flag {
                 b'<' => return Some(Item::Up),
                 b'=' => return Some(Item::Absolute),
@@ -246,6 +249,21 @@ mod tests {
         let mut data = vec![b'>', 191 + 16];
         data.extend(digits);
         assert_eq!(items(&data), [Item::Coordinate(400.0)]);
+    }
+
+    #[test]
+    fn flags_may_follow_line_ends() {
+        // gnuplot ends a line after each pair; the flag after it once went unseen.
+        assert_eq!(
+            items(b"\xbf\xbf\n<\xbf\xbf"),
+            [
+                Item::Coordinate(0.0),
+                Item::Coordinate(0.0),
+                Item::Up,
+                Item::Coordinate(0.0),
+                Item::Coordinate(0.0)
+            ]
+        );
     }
 
     #[test]

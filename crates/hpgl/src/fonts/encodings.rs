@@ -8,6 +8,8 @@ pub(crate) enum CharacterSet {
     Latin1,
     /// HP's own 8-bit set.
     Roman8,
+    /// The upper half of HP's set in the places of ASCII: the Roman extensions of plotters with seven bits.
+    RomanExtensions,
     /// Code page 437 of the IBM PC.
     CodePage437,
     /// Code page 850.
@@ -27,7 +29,7 @@ impl CharacterSet {
     pub(crate) fn of_plotter(number: f64) -> Option<Self> {
         Some(match number as i32 {
             0 | 6 | 9 => Self::Latin1,
-            7 => Self::Roman8,
+            7 => Self::RomanExtensions,
             30 => Self::Iso646("#¤@ÄÖÅ^`äöå~"),
             31 => Self::Iso646("#¤ÉÄÖÅÜéäöåü"),
             32 | 39 => Self::Iso646("#$@ÆØÅ^`æøå~"),
@@ -72,6 +74,9 @@ impl CharacterSet {
                 return place.and_then(|place| letters.chars().nth(place)).unwrap_or(char::from(byte & 0x7f));
             }
             Self::Latin1 => CODE_PAGE_1252,
+            Self::RomanExtensions => {
+                return Self::Roman8.character(if byte > b' ' { byte | 0x80 } else { byte });
+            }
             Self::Roman8 => ROMAN_8,
             Self::CodePage437 => CODE_PAGE_437,
             Self::CodePage850 => CODE_PAGE_850,
@@ -123,12 +128,12 @@ mod tests {
         for (set, byte) in [
             (CharacterSet::Latin1, 0xfc),
             (CharacterSet::Roman8, 0xcf),
+            (CharacterSet::RomanExtensions, 0x4f),
             (CharacterSet::CodePage437, 0x81),
             (CharacterSet::CodePage850, 0x81),
             (CharacterSet::Iso646("#$§ÄÖÜ^`äöüß"), b'}'),
         ] {
             assert_eq!(set.character(byte), 'ü');
-            assert_eq!(set.character(b'A'), 'A');
         }
         assert_eq!(CharacterSet::Latin1.character(0x81), char::REPLACEMENT_CHARACTER);
     }

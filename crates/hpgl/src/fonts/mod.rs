@@ -27,13 +27,22 @@ impl Glyph {
         Some(Self { advance: f64::from(advance), strokes })
     }
 
+    /// The middle of its ink; the origin for a blank.
+    pub(crate) fn middle(self) -> (f64, f64) {
+        let middle = |of: fn((f64, f64)) -> f64| {
+            let values = || self.strokes().flatten().map(of);
+            let (low, high) = (values().reduce(f64::min), values().reduce(f64::max));
+            low.zip(high).map_or(0.0, |(low, high)| 0.5 * (low + high))
+        };
+        (middle(|p| p.0), middle(|p| p.1))
+    }
+
     /// Its strokes, each as points in units of the font.
     pub(crate) fn strokes(self) -> impl Iterator<Item = impl Iterator<Item = (f64, f64)>> {
         let unit = |byte: u8| f64::from(byte) - f64::from(b'R');
-        self.strokes
-            .split(' ')
-            .filter(|stroke| !stroke.is_empty())
-            .map(move |stroke| stroke.as_bytes().chunks_exact(2).map(move |pair| (unit(pair[0]), unit(pair[1]))))
+        self.strokes.split(' ').filter(|stroke| !stroke.is_empty()).map(move |stroke| {
+            stroke.as_bytes().chunks_exact(2).map(move |pair| (unit(pair[0]), unit(pair[1])))
+        })
     }
 }
 
@@ -62,7 +71,8 @@ mod tests {
         let glyph = Glyph::of('A').unwrap();
         let points: Vec<(f64, f64)> = glyph.strokes().flatten().collect();
         let height = points.iter().map(|p| p.1).fold(0.0, f64::max);
-        let width = points.iter().map(|p| p.0).fold(0.0, f64::max) - points.iter().map(|p| p.0).fold(99.0, f64::min);
+        let width =
+            points.iter().map(|p| p.0).fold(0.0, f64::max) - points.iter().map(|p| p.0).fold(99.0, f64::min);
         assert_eq!((height, width), (CAP_HEIGHT, BODY_WIDTH));
         assert_eq!(points.iter().map(|p| p.1).fold(0.0, f64::min), 0.0);
     }

@@ -2,7 +2,8 @@
 //!
 //! Taken from the crate `vector-text-newstroke` 0.1.1: the Latin alphabets, Greek letters, and the signs of the character sets
 //! that plotters knew. Each row has a character, its advance, and its strokes: a blank lifts the pen, every other
-//! pair of bytes is a point, `R` standing for 0. Capitals are 21 units high, the base line is at y = 0.
+//! pair of bytes is a point, `R` standing for 0. Capitals are 21 units high, the base line is at y = 0. Side bearings of
+//! letters beyond 5 units, as composed letters have them there, are cut to 5.
 
 /// The glyphs in the order of their characters.
 #[rustfmt::skip]
@@ -80,8 +81,8 @@ pub(super) const GLYPHS: &[(char, i8, &str)] = &[
     ('f', 12, r"T`\` WRWdXfZg\g"),
     ('g', 19, r"```O_M^L\KYKWL `S^RZRXSWTVVV\W^X_Z`^``_"),
     ('h', 19, "WRWg `R`]__]`Z`X_W^"),
-    ('i', 16, "ZRZ` ZgYfZe[fZgZe"),
-    ('j', 16, "Z`ZNYLWKVK ZgYfZe[fZgZe"),
+    ('i', 12, "XRX` XgWfXeYfXgXe"),
+    ('j', 14, "Z`ZNYLWKVK ZgYfZe[fZgZe"),
     ('k', 17, "WRWg YZ_R _`WX"),
     ('l', 11, "ZRXSWUWg"),
     ('m', 28, "WRW` W^X_Z`]`__`]`R `]a_c`f`h_i]iR"),
@@ -243,7 +244,7 @@ pub(super) const GLYPHS: &[(char, i8, &str)] = &[
     ('ĭ', 12, r"XRX` ThUfWeYe[f\h"),
     ('Į', 12, "XRXg XRVPUNVLXKZK"),
     ('į', 12, "XRX` XRVPUNVLXKZK"),
-    ('İ', 16, "ZRZg ZnYmZl[mZnZl"),
+    ('İ', 12, "XRXg XnWmXlYmXnXl"),
     ('ı', 10, "WRW`"),
     ('Ĵ', 17, r"]g]X\UZSWRUR Yl]oal"),
     ('ĵ', 12, r"X`XNWLUKTK TeXh\e"),
@@ -255,7 +256,7 @@ pub(super) const GLYPHS: &[(char, i8, &str)] = &[
     ('Ļ', 17, r"aRWRWg \Q^P_N^L\KYK"),
     ('ļ', 11, "ZRXSWUWg WQYPZNYLWKTK"),
     ('Ľ', 17, "aRWRWg `e]b"),
-    ('Ŀ', 21, "aRWRWg __^^_]`^___]"),
+    ('Ŀ', 20, "aRWRWg __^^_]`^___]"),
     ('ŀ', 15, r"ZRXSWUWg ^^_]^\]]^^^\"),
     ('Ł', 17, r"aRWRWg T\Z`"),
     ('ł', 11, r"ZRXSWUWg T\Z`"),

@@ -108,7 +108,9 @@ impl Interpreter {
         let unit = self.frame.unit_mm();
         let (width, height) = match characters.size {
             Size::Absolute(width, height) => (width * 10.0 / unit, height * 10.0 / unit),
-            Size::Relative(width, height) => (width / 100.0 * extent.x.abs(), height / 100.0 * extent.y.abs()),
+            Size::Relative(width, height) => {
+                (width / 100.0 * extent.x.abs(), height / 100.0 * extent.y.abs())
+            }
         };
         let direction = match characters.direction {
             Direction::Absolute(run, rise) => Vec2::new(run, rise),

@@ -66,8 +66,11 @@ impl Interpreter {
                 15 => characters.alternate_selected = false,
                 0..=31 => letters.push(Letter { character: char::from(byte), span }),
                 _ => {
-                    let font =
-                        if characters.alternate_selected { characters.alternate } else { characters.standard };
+                    let font = if characters.alternate_selected {
+                        characters.alternate
+                    } else {
+                        characters.standard
+                    };
                     letters.push(Letter { character: font.set.character(byte), span });
                 }
             }
@@ -191,7 +194,11 @@ impl Interpreter {
         let character = letter.character;
         let Some(glyph) = Glyph::of(character) else {
             self.report_at(codes::UNKNOWN_CHARACTER, letter.span, || {
-                format!("the character `{}` ({:#x}) is not in the font", character.escape_debug(), u32::from(character))
+                format!(
+                    "the character `{}` ({:#x}) is not in the font",
+                    character.escape_debug(),
+                    u32::from(character)
+                )
             });
             return;
         };
@@ -282,7 +289,8 @@ impl Interpreter {
         let shape = self.shape();
         self.ink();
         self.tracer.finish();
-        self.glyph(glyph, &shape, self.position, -0.5 * glyph.advance, -0.5 * CAP_HEIGHT);
+        let (x, y) = glyph.middle();
+        self.glyph(glyph, &shape, self.position, -x, -y);
     }
 
     /// `UC`: a character of the user's, as steps on a grid in its cell, with pen control between them. The pen begins up, and is
@@ -309,7 +317,9 @@ impl Interpreter {
                 continue;
             }
             let [dy, more @ ..] = more else {
-                self.report(codes::ODD_COORDINATES, || "`UC` ends with an x without y, which is passed over".into());
+                self.report(codes::ODD_COORDINATES, || {
+                    "`UC` ends with an x without y, which is passed over".into()
+                });
                 break;
             };
             let from = shape.at(origin, x / GRID.x, y / GRID.y);

@@ -17,10 +17,10 @@ use drawing::{Drawing, Pen, Point, Span};
 
 use crate::codes;
 use crate::diagnostics::{Code, Findings};
+use crate::fonts::Glyph;
 use crate::profile::Options;
 use crate::syntax::{Command, Mnemonic, Syntax};
 use crate::{Page, Reading, Summary};
-use crate::fonts::Glyph;
 use characters::Characters;
 use fill::FillType;
 use frame::Frame;
