@@ -80,7 +80,7 @@ pub(crate) struct Planning {
     #[arg(long, value_name = "X,Y", value_parser = place, allow_hyphen_values = true)]
     pub(crate) place: Option<(f64, f64)>,
     /// Scale the drawing about its origin
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub(crate) scale: Option<f64>,
     /// Turn the drawing counterclockwise, its lower-left corner staying in place
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]

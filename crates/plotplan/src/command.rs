@@ -4,6 +4,7 @@ mod check;
 mod convert;
 mod info;
 mod machine;
+mod motion;
 mod preview;
 mod verify;
 

@@ -33,7 +33,8 @@ pub(crate) fn write(
         use std::os::unix::fs::PermissionsExt as _;
         temporary.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = temporary.tempfile_in(folder).map_err(failed)?;
+    // Only the kind of error: its text names the temporary file, which means nothing to anybody and is never the same.
+    let file = temporary.tempfile_in(folder).map_err(|error| failed(error.kind().into()))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
     let file = out.into_inner().map_err(|error| failed(error.into_error()))?;

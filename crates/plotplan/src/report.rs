@@ -144,12 +144,27 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
 /// A certificate, for people.
 pub fn certificate_text(certificate: &Certificate) -> String {
     let mut text = String::new();
-    let verdict = if certificate.holds { "holds" } else { "DOES NOT HOLD" };
-    let _ = writeln!(text, "certificate {verdict} (tolerance {} mm)", certificate.tolerance_mm);
+    let _ =
+        writeln!(text, "certificate {} (tolerance {} mm)", verdict(certificate), certificate.tolerance_mm);
     if let Some(before) = &certificate.before_rounding {
         deviation_text(&mut text, "before rounding to ticks", before);
     }
     deviation_text(&mut text, "in whole ticks", &certificate.after_rounding);
+    text + &details(certificate)
+}
+
+/// A certificate of a plan that was not compared with a drawing, for people.
+pub fn motion_text(certificate: &Certificate) -> String {
+    format!("motion {}\n{}", verdict(certificate), details(certificate))
+}
+
+fn verdict(certificate: &Certificate) -> &'static str {
+    if certificate.holds { "holds" } else { "DOES NOT HOLD" }
+}
+
+/// What a certificate says of the machine and its motors, and what failed.
+fn details(certificate: &Certificate) -> String {
+    let mut text = String::new();
     let _ = writeln!(
         text,
         "  tick floor of this machine here: {:.4} mm worst, {:.4} mm RMS",

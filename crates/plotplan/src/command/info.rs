@@ -9,6 +9,9 @@ use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::output;
 
+/// Lengths are measured along the plan's own ink: any tolerance does.
+const TOLERANCE_MM: f64 = 1.0;
+
 pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
     let input = input::read(&arguments.file)?;
     let text = if formats::looks_like_plan(&input.bytes) {
@@ -78,7 +81,7 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
             motor.name, limits.speed, limits.acceleration
         );
     }
-    let certificate = super::verify::replay(&plan, &machine.machine, None, f64::INFINITY);
+    let certificate = super::verify::replay(&plan, &machine.machine, None, TOLERANCE_MM);
     let _ = writeln!(text, "ink      {}", metres(certificate.ink_mm));
     let _ = writeln!(text, "travel   {}", metres(certificate.travel_mm));
     let _ = writeln!(text, "pens     {:?}, down {} times", certificate.pens, certificate.pen_downs);

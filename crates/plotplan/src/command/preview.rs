@@ -4,9 +4,9 @@ use std::path::Path;
 
 use drawing::{Drawing, Point, Rect};
 use formats::{Ink, Scene};
-use kinematics::{Joints, Machine};
 use plotplan::pipeline;
 
+use super::motion::Motion;
 use crate::cli::Preview;
 use crate::failure::Failure;
 use crate::input::{self, Input};
@@ -82,28 +82,7 @@ fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, st
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
     let (plan, machine) = super::verify::plan(input, machine)?;
     let machine = &machine.machine;
-    let mut ink: Vec<Ink> = Vec::new();
-    let mut travel: Vec<Vec<Point>> = Vec::new();
-    let mut pen = None;
-    for pair in plan.table.rows.windows(2) {
-        let ends = [pair[0], pair[1]].map(|row| Joints::from(row.ticks.map(|ticks| ticks as f64)));
-        let path = motion(machine, ends[0], ends[1]);
-        if pen != Some(pair[0].pen) {
-            pen = Some(pair[0].pen);
-            let start = vec![path[0]];
-            if pair[0].pen == 0 {
-                travel.push(start)
-            } else {
-                ink.push(Ink { pen: pair[0].pen, points: start })
-            }
-        }
-        let line =
-            if pair[0].pen == 0 { travel.last_mut() } else { ink.last_mut().map(|ink| &mut ink.points) };
-        if let Some(line) = line {
-            line.extend(path[1..].iter().filter(|point| Some(**point) != path.first().copied()));
-        }
-    }
-    travel.retain(|line| line.len() > 1);
+    let Motion { ink, travel } = Motion::of(&plan.table.rows, machine, CHORD_MM);
     let start = machine.geometry().forward(&machine.start());
     let title = format!("{} on {}", input.name, machine.name());
     Ok(Scene {
@@ -114,11 +93,4 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
         travel,
         start: Some(start),
     })
-}
-
-/// The pen's path while the motors move linearly between two rows, in chords.
-fn motion(machine: &Machine, from: Joints, to: Joints) -> Vec<Point> {
-    let bend = machine.geometry().bend(&machine.joints(&from), &machine.joints(&to));
-    let pieces = (bend / (8.0 * CHORD_MM)).sqrt().ceil().clamp(1.0, 1000.0) as usize;
-    (0..=pieces).map(|k| machine.pen_at(&(from + (k as f64 / pieces as f64) * (to - from)))).collect()
 }

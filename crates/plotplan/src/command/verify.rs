@@ -6,9 +6,10 @@ use formats::PlanFile;
 use kinematics::Machine;
 use plotplan::machine_file::MachineFile;
 use plotplan::report;
-use serde_json::json;
+use serde_json::{Value, json};
 use verify::{Certificate, Verifier};
 
+use super::motion::Motion;
 use crate::cli::{ReportForm, Verify};
 use crate::failure::Failure;
 use crate::input::{self, Input, LoadedMachine};
@@ -32,19 +33,21 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
     let certificate = replay(&plan, &machine.machine, drawing.as_ref(), tolerance);
-    match arguments.report {
-        ReportForm::Text => {
-            if drawing.is_none() {
-                terminal::warning("without --drawing only the motion is verified, not what it draws");
+    let text = match (arguments.report, drawing.is_some()) {
+        (ReportForm::Text, true) => report::certificate_text(&certificate),
+        (ReportForm::Text, false) => {
+            terminal::warning("without --drawing only the motion is verified, not what it draws");
+            report::motion_text(&certificate)
+        }
+        (ReportForm::Json, compared) => {
+            let mut certificate = report::certificate(&certificate);
+            if !compared {
+                certificate["after_rounding"] = Value::Null;
             }
-            let text = report::certificate_text(&certificate);
-            output::write("-", |out| out.write_all(text.as_bytes()))?;
+            format!("{}\n", json!({ "certificate": certificate }))
         }
-        ReportForm::Json => {
-            let text = format!("{}\n", json!({ "certificate": report::certificate(&certificate) }));
-            output::write("-", |out| out.write_all(text.as_bytes()))?;
-        }
-    }
+    };
+    output::write("-", |out| out.write_all(text.as_bytes()))?;
     if certificate.holds { Ok(()) } else { Err(Failure::Refused) }
 }
 
@@ -69,6 +72,9 @@ pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, Lo
     Ok((plan, machine))
 }
 
+/// Chords of a plan's own ink stay so close to it, as a share of the tolerance.
+const OWN_INK: f64 = 0.01;
+
 /// Replays a plan. Without a drawing there is nothing to hold its ink against but itself.
 pub(super) fn replay(
     plan: &PlanFile,
@@ -76,8 +82,14 @@ pub(super) fn replay(
     drawing: Option<&Drawing>,
     tolerance: f64,
 ) -> Certificate {
-    let none = Drawing::default();
-    let mut verifier = Verifier::new(machine, drawing.unwrap_or(&none), &plan.table.header, tolerance);
+    let own;
+    let drawing = if let Some(drawing) = drawing {
+        drawing
+    } else {
+        own = Motion::of(&plan.table.rows, machine, OWN_INK * tolerance.max(DEFAULT_TOLERANCE_MM)).drawing();
+        &own
+    };
+    let mut verifier = Verifier::new(machine, drawing, &plan.table.header, tolerance);
     for row in &plan.table.rows {
         verifier.row(*row, None);
     }
