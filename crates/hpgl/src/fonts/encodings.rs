@@ -14,7 +14,7 @@ pub(crate) enum CharacterSet {
     CodePage437,
     /// Code page 850.
     CodePage850,
-    /// ISO 646 with letters of a language in the places of `#$@[\\]^`{|}~`.
+    /// ISO 646 with letters of a language in the places that [`NATIONAL`] lists.
     Iso646(&'static str),
 }
 

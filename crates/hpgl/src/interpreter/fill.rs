@@ -90,7 +90,7 @@ impl Interpreter {
                     }
                     10 => fill.shade = options.first().copied().unwrap_or(fill.shade),
                     21 => {
-                        fill.pattern = options.first().map_or(fill.pattern, |pattern| pattern.trunc() as i32)
+                        fill.pattern = options.first().map_or(fill.pattern, |pattern| pattern.trunc() as i32);
                     }
                     _ => {
                         self.bad_parameters("a fill type: 1 to 4, 10, 11, 21 or 22");

@@ -129,7 +129,7 @@ impl Interpreter {
         let place = f64::from((origin % 10).clamp(1, 9) - 1);
         let (column, row) = ((place / 3.0).floor(), place % 3.0);
         let printing = || line.iter().filter(|letter| letter.character >= ' ');
-        let last = printing().last().map_or(' ', |letter| letter.character);
+        let last = printing().next_back().map_or(' ', |letter| letter.character);
         let (width, height) = match self.characters.path {
             0 | 2 => {
                 let advances: f64 = printing().map(|letter| self.advance(letter.character)).sum();
