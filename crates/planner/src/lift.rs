@@ -44,8 +44,10 @@ pub struct Cell {
     /// Largest |dp/ds| of the pen.
     pub pen_speed: f64,
     /// Bound on how much the pen's path bends against linear joint motion, for a unit of (ds/dt)², 1/mm: rows `T` apart
-    /// leave the curve by `(ds/dt)² T² bend / 8` at the most.
+    /// at even speed leave the curve by `(ds/dt)² T² bend / 8` at the most.
     pub bend: f64,
+    /// Whether rows also leave the curve by how the pen speeds up: by `|d²s/dt²| T² pen_speed / 8` more.
+    pub near_turn: bool,
     /// By how much the derivatives may exceed a straight line between the three samples, as a share of the limits: 0
     /// where they are linear in `s` (lines and parabolas on machines whose kinematics are linear).
     pub slack: f64,
@@ -89,6 +91,7 @@ impl JointPath {
                 second: [Vector2::zeros(); 3],
                 pen_speed: 0.0,
                 bend: 0.0,
+                near_turn: false,
                 slack: 0.0,
             }],
         })
@@ -211,6 +214,7 @@ impl Lifter<'_> {
                 second: samples.map(|sample| sample.second),
                 pen_speed: most(|sample| sample.pen_speed),
                 bend: most(|sample| sample.bend),
+                near_turn: piece.near_turn,
                 // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
                 slack: 0.5 * bulge,
             });
@@ -272,7 +276,10 @@ impl Lifter<'_> {
         let geometry = self.machine.geometry();
         let (rates, _) = geometry.path_derivatives(&pose, velocity, acceleration);
         let (first, second) = self.machine.motor_derivatives(&pose, velocity, acceleration);
-        let bend = turning + geometry.bend(&pose, &(pose + rates));
+        // Along a straight line an uneven parameter bends nothing; on a turn all of p'' may.
+        let bending =
+            if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
+        let bend = bending + geometry.bend(&pose, &(pose + rates));
         Ok(Sample { s, point, pose, first, second, pen_speed, turning, bend })
     }
 }

@@ -9,7 +9,8 @@
 //! On a cell `u` is constant, so b is linear in s; where m' and m'' are linear too, `m' u + m'' b` is convex or concave
 //! enough that its bounds at the cell's start, middle and end hold between them (what is left is the cell's
 //! [`Cell::slack`], by which the limits are lowered). With `b(f) = b + 2 f length u` at the share f of the cell that is
-//! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b).
+//! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
+//! two more near turns, where rows would cut them (see `path::zones`).
 //!
 //! Reachable-set method (Pham & Pham 2018, arXiv 1707.07239). Since (0, 0) is allowed everywhere and all conditions are
 //! convex, the set of b from which the end can be reached is an interval [0, top] at every node. Backward sweep: `top`
@@ -85,19 +86,19 @@ struct Strip {
 
 /// A cell's conditions.
 struct Bounds {
-    strips: [Strip; 6],
+    strips: [Strip; 8],
     /// Twice the cell's length: b at its end is `b + twice * u`.
     twice: f64,
     /// The largest b anywhere on it by speed.
     cap: f64,
-    /// For peaks inside the cell: bounds on |m'| / a and |m''| / a.
-    first: [f64; 2],
-    second: [f64; 2],
+    /// For peaks inside the cell: bounds on |m'| / a and |m''| / a of each motor, and of the pen near a turn.
+    first: [f64; 3],
+    second: [f64; 3],
 }
 
 impl Bounds {
     fn new(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> Self {
-        let mut strips = [Strip::default(); 6];
+        let mut strips = [Strip::default(); 8];
         let (mut first, mut second) = ([0.0_f64; 2], [0.0_f64; 2]);
         let pen = cap.pen / cell.pen_speed;
         let mut largest = (pen * pen).min(8.0 * cap.row_deviation / (cap.period * cap.period * cell.bend));
@@ -115,7 +116,22 @@ impl Bounds {
             let speed = motor.max_speed / (fastest * (1.0 + cell.slack));
             largest = largest.min(speed * speed);
         }
-        Self { strips, twice: 2.0 * cell.length, cap: largest, first, second }
+        let mut bounds = Self {
+            strips,
+            twice: 2.0 * cell.length,
+            cap: largest,
+            first: [first[0], first[1], 0.0],
+            second: [second[0], second[1], 0.0],
+        };
+        if cell.near_turn {
+            // |p'| |u| + bend b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
+            let limit = 8.0 * cap.row_deviation / (cap.period * cap.period);
+            let (p, r) = (cell.pen_speed / limit, cell.bend / limit);
+            bounds.strips[6] = Strip { p, r };
+            bounds.strips[7] = Strip { p, r: -r };
+            (bounds.first[2], bounds.second[2]) = (p, r);
+        }
+        bounds
     }
 
     /// The largest b at the start for which some u fulfils all conditions and leads into [0, next].
@@ -171,7 +187,7 @@ impl Bounds {
             start += length;
         };
         // Small peaks between cells whose bounds differ a little would only make the motors chatter.
-        let worthwhile = if self.second == [0.0; 2] { 1.0 + 1e-9 } else { 1.1 };
+        let worthwhile = if self.second == [0.0; 3] { 1.0 + 1e-9 } else { 1.1 };
         if top <= worthwhile * higher {
             push(cell.length, b0, b1);
             return;

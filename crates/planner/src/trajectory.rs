@@ -120,10 +120,12 @@ impl Shares {
         let poses = places.iter().filter_map(|place| machine.pose_near(*place, &machine.start()).ok());
         let acceleration = poses.map(|pose| pen_acceleration(&pose)).fold(0.0, f64::max);
         let tolerance = (1.0 - RESERVE) * settings.tolerance;
-        let row = (1.5 * period * period * acceleration / 8.0).min(ROW_SHARE * tolerance);
+        let (needed, share) = (1.5 * period * period * acceleration / 8.0, ROW_SHARE * tolerance);
+        let row = needed.min(share);
         let path = tolerance - row;
         let simplify = SIMPLIFY_SHARE * path;
-        Self { row, path: Budget { chord: 0.5 * path, simplify, blend: path - simplify } }
+        let marked = if needed > share { row } else { f64::INFINITY };
+        Self { row, path: Budget { chord: 0.5 * path, simplify, blend: path - simplify, row: marked } }
     }
 }
 
@@ -207,10 +209,23 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// The stroke's sections as joint paths, each with the pose at its end.
+    ///
+    /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
+    /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
     fn lift(&self, stroke: &Stroke, pose: Joints) -> Result<Vec<(JointPath, Joints)>, OutOfReach> {
+        let exact = Budget { simplify: 0.0, blend: 0.0, ..self.budget.path };
+        self.lift_within(stroke, pose, &self.budget.path).or_else(|_| self.lift_within(stroke, pose, &exact))
+    }
+
+    fn lift_within(
+        &self,
+        stroke: &Stroke,
+        pose: Joints,
+        budget: &Budget,
+    ) -> Result<Vec<(JointPath, Joints)>, OutOfReach> {
         let mut paths = Vec::new();
         let mut pose = pose;
-        for section in sections(stroke, &self.budget.path) {
+        for section in sections(stroke, budget) {
             let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
             let path = JointPath::lift(self.machine, section, pose, self.settings.tolerance)?;
             pose = self.end_pose(&path, end)?;

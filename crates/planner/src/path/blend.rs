@@ -15,7 +15,7 @@
 //! `c² = 8 d a / |v - u|²`. A circular arc of the same deviation allows `a d / (1 / cos(theta/2) - 1)`: the same for
 //! small turns, 1.66 times less at a right angle. The vertex is missed by d and the blend strays by less.
 
-use drawing::{CubicBez, Line, Point, Segment, Vec2};
+use drawing::{CubicBez, Point, Segment, Vec2};
 
 use super::{direction_at, distance, is_smooth};
 
@@ -63,7 +63,7 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64) -> Vec<Vec<Segment>> 
             Joint::Smooth => {}
             Joint::Stop => sections.push(std::mem::take(&mut section)),
             Joint::Blend(leg) => {
-                section.push(parabola(piece, &pieces[index + 1], leg));
+                section.extend(parabola(piece, &pieces[index + 1], leg));
                 taken = leg;
             }
         }
@@ -84,7 +84,7 @@ fn joints(pieces: &[Segment], deviation: f64) -> Vec<Joint> {
         .iter()
         .enumerate()
         .map(|(index, piece)| {
-            let length = straight_length(piece);
+            let length = available(piece);
             let (before, after) =
                 (leg(index.checked_sub(1).and_then(|k| joints.get(k))), leg(joints.get(index)));
             (before.min((length / 2.0).max(length - after)), after.min((length / 2.0).max(length - before)))
@@ -109,53 +109,105 @@ fn wanted(before: &Segment, after: &Segment, deviation: f64) -> Joint {
     if is_smooth(u, v) {
         return Joint::Smooth;
     }
-    let both_straight = matches!((before, after), (Segment::Line(_), Segment::Line(_)));
-    if deviation <= 0.0 || u.dot(v) < TURNS_BACK || !both_straight {
+    if deviation <= 0.0 || u.dot(v) < TURNS_BACK {
         return Joint::Stop;
     }
-    Joint::Blend(4.0 * deviation / (v - u).hypot2().sqrt())
+    let leg = 4.0 * deviation / (v - u).hypot2().sqrt();
+    if matches!((before, after), (Segment::Line(_), Segment::Line(_))) {
+        return Joint::Blend(leg);
+    }
+    // Between curves the closed form is only where to begin: shorten until what is measured holds.
+    let mut leg = leg.min(available(before) / 2.0).min(available(after) / 2.0);
+    while leg > SHORTEST {
+        if parabola(before, after, leg).is_some_and(|blend| strays(&blend, before, after, leg) <= deviation) {
+            return Joint::Blend(leg);
+        }
+        leg *= 0.7;
+    }
+    Joint::Stop
 }
 
-/// What a blend may take from.
-fn straight_length(piece: &Segment) -> f64 {
+/// How much of a piece blends may take, mm: of a curve no more than turns by half a radian.
+fn available(piece: &Segment) -> f64 {
     match piece {
         Segment::Line(line) => distance(line.p0, line.p1),
-        _ => 0.0,
+        curve => {
+            let bends = [0.0, 0.5, 1.0].map(|t| {
+                let (first, second) = curve.derivatives(t);
+                first.cross(second).abs() / (first.hypot2() * first.hypot2().sqrt())
+            });
+            curve.length().min(0.5 / bends.into_iter().fold(0.0, f64::max))
+        }
     }
 }
 
 /// The piece without `start` mm at its start and `end` mm at its end; nothing if none of it is left.
 fn trimmed(piece: &Segment, start: f64, end: f64) -> Option<Segment> {
-    let Segment::Line(line) = piece else { return Some(*piece) };
-    let length = distance(line.p0, line.p1);
-    if length - start - end <= SHORTEST {
-        return None;
+    if start == 0.0 && end == 0.0 {
+        return Some(*piece);
     }
-    let along = (line.p1 - line.p0) / length;
-    Some(Segment::Line(Line::new(line.p0 + start * along, line.p1 - end * along)))
+    let (t0, t1) = (parameter(piece, start, true), parameter(piece, end, false));
+    ((t1 - t0) * available(piece) > SHORTEST).then(|| piece.part(t0, t1))
 }
 
-fn parabola(before: &Segment, after: &Segment, leg: f64) -> Segment {
-    let vertex = before.end();
-    let end = |to: Point| vertex + (leg / distance(vertex, to)) * (to - vertex);
-    let (start, end) = (end(before.start()), end(after.end()));
+/// The parameter about `leg` mm from an end: exactly so on lines and circles, by the speed at the end on other curves.
+fn parameter(piece: &Segment, leg: f64, at_start: bool) -> f64 {
+    let end = if at_start { 0.0 } else { 1.0 };
+    let share = (leg / piece.derivatives(end).0.hypot2().sqrt()).min(0.5 * (1.0 + 1e-9));
+    if at_start { share } else { 1.0 - share }
+}
+
+/// The blend at the joint of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
+/// Nothing if those do not meet between.
+fn parabola(before: &Segment, after: &Segment, leg: f64) -> Option<Segment> {
+    let (t0, t1) = (parameter(before, leg, false), parameter(after, leg, true));
+    let (start, end) = (before.eval(t0), after.eval(t1));
+    let (u, v) = (direction_at(before, t0)?, direction_at(after, t1)?);
+    // start + x u = end - y v
+    let (across, turn) = (end - start, u.cross(v));
+    let (x, y) = (across.cross(v) / turn, u.cross(across) / turn);
+    let fair = |length: f64| length > 0.2 * leg && length < 5.0 * leg;
+    if !(fair(x) && fair(y)) {
+        return None;
+    }
+    let vertex = start + x * u;
     // A quadratic Bézier curve as a cubic.
     let third = |p: Point| p + (2.0 / 3.0) * (vertex - p);
-    Segment::Cubic(CubicBez::new(start, third(start), third(end), end))
+    Some(Segment::Cubic(CubicBez::new(start, third(start), third(end), end)))
+}
+
+/// How far a blend strays from the two pieces, or misses their joint, mm, by samples; a bound to a few per cent.
+fn strays(blend: &Segment, before: &Segment, after: &Segment, leg: f64) -> f64 {
+    const SAMPLES: u32 = 16;
+    let along = |segment: &Segment, from: f64, to: f64| -> Vec<Point> {
+        (0..=SAMPLES).map(|k| segment.eval(from + (to - from) * f64::from(k) / f64::from(SAMPLES))).collect()
+    };
+    let mut corner = along(before, parameter(before, leg, false), 1.0);
+    corner.extend(along(after, 0.0, parameter(after, leg, true)));
+    let path = along(blend, 0.0, 1.0);
+    let off = |from: &[Point], to: &[Point]| {
+        let nearest =
+            |p: &Point| to.windows(2).map(|w| to_chord(*p, w[0], w[1])).fold(f64::INFINITY, f64::min);
+        from.iter().map(nearest).fold(0.0, f64::max)
+    };
+    1.02 * off(&path, &corner).max(off(&corner, &path))
+}
+
+fn to_chord(p: Point, a: Point, b: Point) -> f64 {
+    let (d, v) = (b - a, p - a);
+    let t = if d.hypot2() > 0.0 { (v.dot(d) / d.hypot2()).clamp(0.0, 1.0) } else { 0.0 };
+    (v - t * d).hypot2().sqrt()
 }
 
 #[cfg(test)]
 mod tests {
+    use drawing::{EllipticArc, Line};
     use proptest::prelude::*;
 
     use super::*;
 
     fn off(p: Point, line: &[Point]) -> f64 {
-        let to = |w: &[Point]| {
-            let (d, v) = (w[1] - w[0], p - w[0]);
-            (v - (v.dot(d) / d.hypot2()).clamp(0.0, 1.0) * d).hypot2().sqrt()
-        };
-        line.windows(2).map(to).fold(f64::INFINITY, f64::min)
+        line.windows(2).map(|w| to_chord(p, w[0], w[1])).fold(f64::INFINITY, f64::min)
     }
 
     proptest! {
@@ -188,6 +240,20 @@ mod tests {
             for p in &points {
                 prop_assert!(off(*p, &path) <= deviation * (1.0 + 1e-3) + 1e-5);
             }
+        }
+    }
+
+    #[test]
+    fn a_line_that_meets_a_circle_at_an_angle_is_blended() {
+        let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(10.0, 0.0)));
+        let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, -1.0, 2.0));
+        let Segment::Arc(at) = arc else { unreachable!("it is an arc") };
+        let to = Segment::Line(Line::new(line.end(), at.eval(0.0)));
+        let sections = sections(&[line, to, arc], 0.05);
+        assert_eq!(sections.len(), 1);
+        for pair in sections[0].windows(2) {
+            let (a, b) = (direction_at(&pair[0], 1.0).unwrap(), direction_at(&pair[1], 0.0).unwrap());
+            assert!(distance(pair[0].end(), pair[1].start()) < 1e-9 && a.dot(b) > 1.0 - 1e-9);
         }
     }
 

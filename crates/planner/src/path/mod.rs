@@ -8,6 +8,7 @@
 
 mod blend;
 mod simplify;
+mod zones;
 
 use drawing::{Line, Point, Segment, Stroke, Vec2};
 
@@ -32,6 +33,9 @@ pub struct Budget {
     pub simplify: f64,
     /// Blends that stand for corners.
     pub blend: f64,
+    /// What linear motion between rows may take, where the motors are strong enough to exceed it: then pieces near turns
+    /// are marked. Infinite where they are not.
+    pub row: f64,
 }
 
 /// A stretch of a section, with the path's parameter `s` running evenly in the curve's own parameter.
@@ -41,6 +45,8 @@ pub struct Piece {
     pub curve: Segment,
     /// dt/ds, 1/mm: how fast the curve's own parameter runs.
     pub rate: f64,
+    /// Whether rows on it may deviate because of how the pen speeds up: on turns and near them.
+    pub near_turn: bool,
 }
 
 impl Piece {
@@ -61,7 +67,10 @@ pub type Section = Vec<Piece>;
 pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
     let pieces = clean(stroke, budget.chord);
     let pieces = if budget.simplify > 0.0 { simplify::simplify(pieces, budget.simplify) } else { pieces };
-    blend::sections(&pieces, budget.blend).into_iter().map(parametrise).collect()
+    let sections = blend::sections(&pieces, budget.blend).into_iter().map(parametrise);
+    sections
+        .map(|section| if budget.row.is_finite() { zones::mark(section, budget.row) } else { section })
+        .collect()
 }
 
 /// The stroke's pieces without those of no length, straight ones in line joined, cusped curves as chords.
@@ -100,7 +109,7 @@ fn parametrise(curves: Vec<Segment>) -> Section {
         let (start, end) = (velocity(&curve, 0.0), velocity(&curve, 1.0));
         let rate = speed / start;
         speed = rate * end;
-        Piece { curve, rate }
+        Piece { curve, rate, near_turn: false }
     };
     curves.into_iter().map(piece).collect()
 }
@@ -151,7 +160,7 @@ mod tests {
 
     use super::*;
 
-    const EXACT: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.0 };
+    const EXACT: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.0, row: f64::INFINITY };
 
     fn polyline(points: &[(f64, f64)]) -> Stroke {
         let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
@@ -164,7 +173,7 @@ mod tests {
         let sections = sections(&stroke, &EXACT);
         assert_eq!(sections.len(), 2);
         let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(5.0, 0.0)));
-        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2 }]);
+        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2, near_turn: false }]);
     }
 
     #[test]

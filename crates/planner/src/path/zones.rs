@@ -1,0 +1,106 @@
+//! Where the pen must not speed up or slow down hard because a turn is near.
+//!
+//! Between rows, a period `T` apart, motors move linearly, so a row may leave the path by `T²/8` times the largest
+//! acceleration of the pen in between. On a straight line that is no deviation: the pen only runs ahead or behind. Near
+//! a turn it is, also on the straight way into it: a row on the line and the next behind the turn cut the corner.
+
+use drawing::Segment;
+
+use super::{Piece, Section};
+
+/// Marks every piece that lies on a turn or so near to one that a row on it may end in the turn, cutting straight
+/// pieces where they leave that zone.
+///
+/// On the zone the pen's acceleration will be kept below `A = 8 row / T²`, so rows deviate by `row` mm at the most. A
+/// turn with the second derivative p'' is run at no more than `c = sqrt(A / |p''|)`; from there, with no more than `A`,
+/// the pen covers at most `c T + A T²/2 = sqrt(8 row / |p''|) + 4 row` in a period: so wide is the zone on each side.
+pub(super) fn mark(section: Section, row: f64) -> Section {
+    let mut zones: Vec<(f64, f64)> = Vec::new();
+    let mut s = 0.0;
+    for piece in &section {
+        let end = s + piece.length();
+        if let Some(second) = turning(piece) {
+            let width = (8.0 * row / second).sqrt() + 4.0 * row;
+            match zones.last_mut() {
+                Some(last) if last.1 >= s - width => last.1 = last.1.max(end + width),
+                _ => zones.push((s - width, end + width)),
+            }
+        }
+        s = end;
+    }
+    let mut marked = Vec::with_capacity(section.len());
+    let mut s = 0.0;
+    let mut zones = zones.into_iter().peekable();
+    for piece in section {
+        let end = s + piece.length();
+        let mut from = s;
+        while from < end {
+            while zones.next_if(|zone| zone.1 <= from).is_some() {}
+            let (to, near_turn) = match zones.peek() {
+                Some(zone) if zone.0 <= from => (zone.1.min(end), true),
+                Some(zone) => (zone.0.min(end), false),
+                None => (end, false),
+            };
+            // Slivers are not worth a piece.
+            let to = if end - to < 1e-6 { end } else { to };
+            marked.push(part(&piece, (from - s) * piece.rate, (to - s) * piece.rate, near_turn));
+            from = to;
+        }
+        s = end;
+    }
+    marked
+}
+
+/// |p''| where a piece is not straight.
+fn turning(piece: &Piece) -> Option<f64> {
+    if matches!(piece.curve, Segment::Line(_)) {
+        return None;
+    }
+    let (_, start) = piece.curve.derivatives(0.0);
+    let (_, end) = piece.curve.derivatives(1.0);
+    let second = piece.rate * piece.rate * start.hypot2().min(end.hypot2()).sqrt();
+    Some(second.max(1e-6))
+}
+
+/// A part of a piece, from t0 to t1 of its curve's own parameter.
+fn part(piece: &Piece, t0: f64, t1: f64, near_turn: bool) -> Piece {
+    if t0 <= 0.0 && t1 >= 1.0 {
+        return Piece { near_turn, ..*piece };
+    }
+    Piece { curve: piece.curve.part(t0, t1.min(1.0)), rate: piece.rate / (t1.min(1.0) - t0), near_turn }
+}
+
+#[cfg(test)]
+mod tests {
+    use drawing::{CubicBez, Line, Point};
+
+    use super::*;
+
+    #[test]
+    fn a_long_line_is_marked_only_near_the_turn() {
+        let line = |a: (f64, f64), b: (f64, f64)| Segment::Line(Line::new(Point::from(a), Point::from(b)));
+        let blend = CubicBez::new(
+            Point::new(9.7, 0.0),
+            Point::new(9.9, 0.0),
+            Point::new(10.0, 0.1),
+            Point::new(10.0, 0.3),
+        );
+        let piece = |curve: Segment, length: f64| Piece { curve, rate: 1.0 / length, near_turn: false };
+        let section = vec![
+            piece(line((0.0, 0.0), (9.7, 0.0)), 9.7),
+            piece(Segment::Cubic(blend), 0.6),
+            piece(line((10.0, 0.3), (10.0, 10.0)), 9.7),
+        ];
+        let marked = mark(section, 0.02);
+        let flags: Vec<bool> = marked.iter().map(|piece| piece.near_turn).collect();
+        assert_eq!(flags, [false, true, true, true, false]);
+        // |p''| = |v - u| / (2 leg) = 1.414 / 0.6.
+        let width = (8.0 * 0.02 / (2.0_f64.sqrt() / 0.6)).sqrt() + 0.08;
+        assert!((marked[1].length() - width).abs() < 1e-9, "{}", marked[1].length());
+        let all: f64 = marked.iter().map(Piece::length).sum();
+        assert!((all - 20.0).abs() < 1e-9);
+        for pair in marked.windows(2) {
+            assert!((pair[0].curve.end() - pair[1].curve.start()).hypot2() < 1e-18);
+        }
+    }
+}
