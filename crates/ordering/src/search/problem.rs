@@ -39,6 +39,17 @@ impl<'a> Problem<'a> {
         Self { points, placed: [park.is_some(), start.is_some()], one_way, cost }
     }
 
+    /// Other strokes, the same depot and cost.
+    pub(crate) fn with_strokes(&self, strokes: impl Iterator<Item = [Point; 2]>) -> Self {
+        let mut points = self.points[..2].to_vec();
+        points.extend(strokes.flatten());
+        Self { points, ..*self }
+    }
+
+    /// Moves a stroke.
+    pub(crate) fn place(&mut self, stroke: usize, ends: [Point; 2]) {
+        self.points[2 * stroke..2 * stroke + 2].copy_from_slice(&ends);
+    }
 
     /// How many strokes there are, the depot included.
     pub(crate) fn stroke_count(&self) -> usize {
@@ -80,7 +91,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Turns a tour so that it begins with the depot, entered where the pen parks and left where it starts.
-    pub(crate) fn canonical(&self, tour: &mut [End]) {
+    pub(crate) fn canonical(tour: &mut [End]) {
         let Some(at) = tour.iter().position(|&end| end < 2) else { return };
         tour.rotate_left(at);
         if tour[0] == 1 {

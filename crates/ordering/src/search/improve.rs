@@ -1,0 +1,246 @@
+//! Better tours: exchanges of a few links in Lin and Kernighan's manner, and kicks to get out of the next dead end.
+
+use std::collections::VecDeque;
+
+use super::construct::Partners;
+use super::problem::{End, Problem, mate};
+use super::random::Random;
+use super::tour::{MOST_LINKS, Tour};
+
+/// How many ends, nearest in the plane, an end may be linked to.
+const CANDIDATES: usize = 10;
+
+/// How many candidates are followed at each depth of an exchange: three links change at the most.
+const BREADTH: [usize; MOST_LINKS - 1] = [10, 10];
+
+/// A kick exchanges two neighbouring stretches of up to so many strokes, one of these bounds or the other. Short ones
+/// do better where there are many strokes for the effort, long ones where there are few.
+const KICKS: [usize; 2] = [5, 50];
+
+/// A kick that makes the tour dearer by up to this many times the mean link is still accepted at the beginning; the
+/// bound falls to nothing at the end (threshold accepting, Dueck and Scheuer 1990, with a random share of the bound).
+const TOLERANCE: f64 = 2.0;
+
+/// A tour and all that is needed to improve it.
+pub(crate) struct Search<'p> {
+    problem: &'p Problem<'p>,
+    tour: Tour,
+    /// The cost of the link at each end.
+    link_cost: Vec<f64>,
+    /// The old costs of links since the last commit.
+    changed: Vec<(End, f64)>,
+    /// Candidates of each end and their costs, cheapest first; those of end `e` are at `first[e]..first[e + 1]`.
+    candidates: Vec<(f64, End)>,
+    first: Vec<u32>,
+    /// Ends at which something has changed.
+    queue: VecDeque<End>,
+    queued: Vec<bool>,
+    /// The exchange under construction: `(0,1), (2,3), …` go, `(1,2), (3,4), …, (last,0)` come.
+    ends: [End; 2 * MOST_LINKS],
+    /// The cost of the whole tour at first.
+    total: f64,
+    /// What has been done, in candidates looked at: the measure of effort.
+    work: u64,
+}
+
+impl<'p> Search<'p> {
+    /// What `new` does for an end, in candidates looked at.
+    const WORK_OF_END: u64 = 40;
+
+    pub(crate) fn new(problem: &'p Problem<'p>, tour: Vec<End>) -> Self {
+        let all: Vec<End> = (0..problem.end_count() as End).collect();
+        let partners = Partners::new(problem, &all);
+        let mut candidates = Vec::with_capacity(all.len() * CANDIDATES);
+        let mut first = vec![0];
+        let mut found = Vec::new();
+        for &end in &all {
+            let begin = candidates.len();
+            if problem.is_placed(end) {
+                partners.of(end).nearest(problem.point(end), CANDIDATES, [end, mate(end)], &mut found);
+                candidates.extend(found.iter().map(|&(_, to)| (problem.cost(end, to), to)));
+                candidates[begin..].sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            }
+            first.push(candidates.len() as u32);
+        }
+        let mut search = Self {
+            problem,
+            tour: Tour::new(tour),
+            link_cost: vec![0.0; all.len()],
+            changed: Vec::new(),
+            candidates,
+            first,
+            queue: VecDeque::new(),
+            queued: vec![false; all.len()],
+            ends: [0; 2 * MOST_LINKS],
+            total: 0.0,
+            work: all.len() as u64 * Self::WORK_OF_END,
+        };
+        for place in 0..search.tour.len() {
+            let [left, right] = search.tour.link_before(place);
+            let cost = problem.cost(left, right);
+            search.link_cost[left as usize] = cost;
+            search.link_cost[right as usize] = cost;
+            search.total += cost;
+        }
+        search
+    }
+
+    /// What has been done, in candidates looked at.
+    pub(crate) fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// Exchanges links until no exchange is found that gains.
+    pub(crate) fn descend(&mut self) {
+        for place in 0..self.tour.len() {
+            for end in self.tour.link_before(place) {
+                self.enqueue(end);
+                self.settle();
+                self.commit();
+            }
+        }
+    }
+
+    /// Kicks the tour until so many more candidates have been looked at, and each time keeps what comes of it unless
+    /// that is too much worse.
+    ///
+    /// A kick is a double bridge of short stretches at a random place (Martin, Otto and Felten 1991; the local form:
+    /// Applegate, Cook and Rohe 2003); the search goes on from its ends alone.
+    pub(crate) fn kick(&mut self, work: u64, random: &mut Random) {
+        let n = self.tour.len();
+        if n < 4 {
+            return;
+        }
+        let tolerance = TOLERANCE * self.total / n as f64;
+        let begin = self.work;
+        while self.work - begin < work {
+            // Should nothing else be there to do, kicking itself is.
+            self.work += 10;
+            let left = 1.0 - (self.work - begin) as f64 / work as f64;
+            let loss = tolerance * left.max(0.0) * random.share();
+            let longest = KICKS[random.below(KICKS.len())].min((n - 1) / 2);
+            let first = random.below(n);
+            let second = first + 1 + random.below(longest);
+            let third = second + 1 + random.below(longest);
+            let [a, b] = self.tour.link_before(first);
+            let [c, d] = self.tour.link_before(second % n);
+            let [e, f] = self.tour.link_before(third % n);
+            self.ends[..6].copy_from_slice(&[a, b, e, f, c, d]);
+            let Some(gain) = self.exchange(3) else { continue };
+            if gain + self.settle() >= -loss {
+                self.commit();
+            } else {
+                self.undo();
+            }
+        }
+    }
+
+    /// The tour, beginning with the depot.
+    pub(crate) fn finish(self) -> Vec<End> {
+        self.tour.finish()
+    }
+
+    fn enqueue(&mut self, end: End) {
+        if !std::mem::replace(&mut self.queued[end as usize], true) {
+            self.queue.push_back(end);
+        }
+    }
+
+    fn commit(&mut self) {
+        self.tour.commit();
+        self.changed.clear();
+    }
+
+    fn undo(&mut self) {
+        self.tour.undo();
+        while let Some((end, cost)) = self.changed.pop() {
+            self.link_cost[end as usize] = cost;
+        }
+    }
+
+    /// Gains below this are rounding errors: sums of gains are sums of links, and those are within the whole tour.
+    fn least_gain(&self) -> f64 {
+        1e-12 * self.total
+    }
+
+    /// Improves at the ends in the queue until it is empty; the gain of it all.
+    fn settle(&mut self) -> f64 {
+        let mut total = 0.0;
+        while let Some(end) = self.queue.pop_front() {
+            self.queued[end as usize] = false;
+            self.ends[0] = end;
+            self.ends[1] = self.tour.link(end);
+            // An exchange puts its ends into the queue, `end` among them.
+            total += self.extend(1, self.link_cost[end as usize]).unwrap_or(0.0);
+        }
+        total
+    }
+
+    /// Looks for a link to add at the end of the `depth` links already taken out, whose costs less those of the links
+    /// already added are `gain`; carries out the first exchange that gains, and says how much.
+    fn extend(&mut self, depth: usize, gain: f64) -> Option<f64> {
+        let last = self.ends[2 * depth - 1] as usize;
+        // The most promising first: the gain when the new link is added and the one that must go for it is gone.
+        let mut steps = [(0.0, 0, 0); CANDIDATES];
+        let mut count = 0;
+        for at in self.first[last]..self.first[last + 1] {
+            let (cost, next) = self.candidates[at as usize];
+            self.work += 1;
+            if !(gain - cost > self.least_gain()) {
+                break;
+            }
+            if self.ends[..2 * depth].contains(&next) {
+                continue;
+            }
+            let step = (gain - cost + self.link_cost[next as usize], next, self.tour.link(next));
+            let mut place = count;
+            while place > 0 && steps[place - 1].0 < step.0 {
+                steps[place] = steps[place - 1];
+                place -= 1;
+            }
+            steps[place] = step;
+            count += 1;
+        }
+        for &(gain, next, other) in &steps[..count.min(BREADTH[depth - 1])] {
+            self.ends[2 * depth] = next;
+            self.ends[2 * depth + 1] = other;
+            if gain - self.problem.cost(other, self.ends[0]) > self.least_gain()
+                && let Some(gain) = self.exchange(depth + 1)
+            {
+                return Some(gain);
+            }
+            if depth < BREADTH.len()
+                && let Some(gain) = self.extend(depth + 1, gain)
+            {
+                return Some(gain);
+            }
+        }
+        None
+    }
+
+    /// Exchanges the first `count` links in `ends`, and says what it gains; nothing if it would not give one tour.
+    fn exchange(&mut self, count: usize) -> Option<f64> {
+        let ends = self.ends;
+        let ends = &ends[..2 * count];
+        let plan = self.tour.reconnect(ends)?;
+        self.work += self.tour.apply(&plan) as u64 / 4;
+        let mut gain = 0.0;
+        for link in ends.chunks_exact(2) {
+            gain += self.link_cost[link[0] as usize];
+            for &end in link {
+                self.changed.push((end, self.link_cost[end as usize]));
+            }
+        }
+        for at in 0..count {
+            let (a, b) = (ends[2 * at + 1], ends[(2 * at + 2) % ends.len()]);
+            let cost = self.problem.cost(a, b);
+            gain -= cost;
+            self.link_cost[a as usize] = cost;
+            self.link_cost[b as usize] = cost;
+        }
+        for &end in ends {
+            self.enqueue(end);
+        }
+        Some(gain)
+    }
+}

@@ -1,0 +1,179 @@
+//! A closed tour in an array, and the exchange of any few of its links.
+
+use super::problem::{End, Problem, mate};
+
+/// The most links that one move exchanges.
+pub(crate) const MOST_LINKS: usize = 3;
+
+/// Strokes in the order they are visited, each given by the end at which it is entered.
+pub(crate) struct Tour {
+    entries: Vec<End>,
+    /// Where each stroke stands in `entries`.
+    place: Vec<u32>,
+    /// What moves overwrote since the last `commit`: first place and length, contents in `saved`.
+    log: Vec<(u32, u32)>,
+    saved: Vec<End>,
+}
+
+/// A stretch of the tour between two links that are taken out.
+#[derive(Clone, Copy, Default)]
+struct Stretch {
+    first: usize,
+    length: usize,
+    forward: bool,
+}
+
+/// The stretches of a tour in the order and the directions of another tour.
+pub(crate) struct Plan {
+    stretches: [Stretch; MOST_LINKS],
+    count: usize,
+}
+
+impl Tour {
+    pub(crate) fn new(entries: Vec<End>) -> Self {
+        let mut place = vec![0; entries.len()];
+        for (at, &entry) in entries.iter().enumerate() {
+            place[entry as usize / 2] = at as u32;
+        }
+        Self { entries, place, log: Vec::new(), saved: Vec::new() }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    fn wrap(&self, place: usize) -> usize {
+        if place >= self.entries.len() { place - self.entries.len() } else { place }
+    }
+
+    /// The place of the stroke that follows the link at `end`, and whether `end` is where that stroke is entered.
+    fn gap(&self, end: End) -> (usize, bool) {
+        let at = self.place[end as usize / 2] as usize;
+        if self.entries[at] == end { (at, true) } else { (self.wrap(at + 1), false) }
+    }
+
+    /// The ends of the link before the stroke at a place: left and entered.
+    pub(crate) fn link_before(&self, place: usize) -> [End; 2] {
+        let before = if place == 0 { self.entries.len() - 1 } else { place - 1 };
+        [mate(self.entries[before]), self.entries[place]]
+    }
+
+    /// The end at the other side of the pen-up move at `end`.
+    pub(crate) fn link(&self, end: End) -> End {
+        let (gap, entered) = self.gap(end);
+        let [left, right] = self.link_before(gap);
+        if entered { left } else { right }
+    }
+
+    /// What becomes of the tour when the links `(e0,e1), (e2,e3), …` are replaced by `(e1,e2), …, (e_last,e0)`;
+    /// nothing if that is not one tour.
+    ///
+    /// Links sorted by place cut the tour into as many stretches; following the new links from stretch to stretch
+    /// must visit them all (Helsgaun 2009, section 5.1: the test costs the number of links, not that of strokes).
+    pub(crate) fn reconnect(&self, ends: &[End]) -> Option<Plan> {
+        let count = ends.len() / 2;
+        // (place, index in `ends` of the link's right end), by place.
+        let mut cuts = [(0, 0); MOST_LINKS];
+        for link in 0..count {
+            let (gap, entered) = self.gap(ends[2 * link]);
+            let cut = (gap, 2 * link + usize::from(!entered));
+            let mut at = link;
+            while at > 0 && cuts[at - 1].0 > gap {
+                cuts[at] = cuts[at - 1];
+                at -= 1;
+            }
+            cuts[at] = cut;
+        }
+        let mut rank = [0; MOST_LINKS];
+        for (at, &(_, right)) in cuts[..count].iter().enumerate() {
+            rank[right / 2] = at;
+        }
+        let mut plan = Plan { stretches: [Stretch::default(); MOST_LINKS], count };
+        let (mut cut, mut forward) = (0, true);
+        for visited in 0..count {
+            let after = if cut + 1 == count { 0 } else { cut + 1 };
+            let before = if cut == 0 { count - 1 } else { cut - 1 };
+            let (low, high) = if forward { (cut, after) } else { (before, cut) };
+            let (first, next) = (cuts[low].0, cuts[high].0);
+            let length = if next > first { next - first } else { next + self.entries.len() - first };
+            plan.stretches[visited] = Stretch { first, length, forward };
+            let leaves = if forward { cuts[high].1 ^ 1 } else { cuts[low].1 };
+            let enters = if leaves % 2 == 1 { leaves + 1 } else { leaves + 2 * count - 1 } % (2 * count);
+            cut = rank[enters / 2];
+            forward = cuts[cut].1 == enters;
+            if cut == 0 && forward {
+                return (visited + 1 == count).then_some(plan);
+            }
+        }
+        None
+    }
+
+    /// Carries a plan out. The longest stretch stays where it is, whatever its direction; the others are rewritten:
+    /// so many strokes.
+    pub(crate) fn apply(&mut self, plan: &Plan) -> usize {
+        let mut stretches = plan.stretches;
+        let stretches = &mut stretches[..plan.count];
+        let mut stays = (0..stretches.len()).max_by_key(|&at| stretches[at].length).unwrap_or(0);
+        if !stretches[stays].forward {
+            stretches.reverse();
+            stays = stretches.len() - 1 - stays;
+            for stretch in stretches.iter_mut() {
+                stretch.forward = !stretch.forward;
+            }
+        }
+        stretches.rotate_left(stays);
+        let n = self.entries.len();
+        let window = self.wrap(stretches[0].first + stretches[0].length);
+        let length = n - stretches[0].length;
+        let base = self.saved.len();
+        let until_end = length.min(n - window);
+        self.saved.extend_from_slice(&self.entries[window..window + until_end]);
+        self.saved.extend_from_slice(&self.entries[..length - until_end]);
+        self.log.push((window as u32, length as u32));
+
+        let mut to = window;
+        for stretch in &stretches[1..] {
+            let offset =
+                if stretch.first >= window { stretch.first - window } else { stretch.first + n - window };
+            let from = base + offset;
+            for step in 0..stretch.length {
+                let entry = if stretch.forward {
+                    self.saved[from + step]
+                } else {
+                    mate(self.saved[from + stretch.length - 1 - step])
+                };
+                self.entries[to] = entry;
+                self.place[entry as usize / 2] = to as u32;
+                to = if to + 1 == n { 0 } else { to + 1 };
+            }
+        }
+        length
+    }
+
+    /// Forgets how to undo.
+    pub(crate) fn commit(&mut self) {
+        self.log.clear();
+        self.saved.clear();
+    }
+
+    /// Undoes all moves since the last `commit`.
+    pub(crate) fn undo(&mut self) {
+        while let Some((window, length)) = self.log.pop() {
+            let base = self.saved.len() - length as usize;
+            let mut to = window as usize;
+            for at in base..self.saved.len() {
+                let entry = self.saved[at];
+                self.entries[to] = entry;
+                self.place[entry as usize / 2] = to as u32;
+                to = if to + 1 == self.entries.len() { 0 } else { to + 1 };
+            }
+            self.saved.truncate(base);
+        }
+    }
+
+    /// The tour, beginning with the depot as [`Problem::canonical`] has it.
+    pub(crate) fn finish(mut self) -> Vec<End> {
+        Problem::canonical(&mut self.entries);
+        self.entries
+    }
+}
