@@ -106,7 +106,7 @@ codes! {
     SCALING_POINTS_MEET = 209 "H0209" Note "scaling points coincide"
         "IP or IR puts P1 and P2 on one line. P2 is moved by one plotter unit, as HP-GL/2 does."
     CLIPPED = 210 "H0210" Note "clipped at the window"
-        "Ink outside the window that IW sets, or outside the page that PS sets, is not drawn."
+        "Ink outside the window that IW sets is not drawn, as the file says."
     EMPTY_WINDOW = 211 "H0211" Warning "window without extent"
         "IW sets a window that is empty or lies outside the page. Nothing is drawn until another one is set."
     OUTPUT_COMMAND = 212 "H0212" Note "command that asks the plotter"
@@ -114,7 +114,9 @@ codes! {
          skipped."
     PAPER_CODE = 213 "H0213" Note "paper size by code"
         "PS with one small number names a paper format by its code, as the 7475A and 7550A understand it. In HP-GL/2 \
-         the same command gives lengths; a page of a few plotter units cannot be meant."
+         the same command gives lengths; a page of a few plotter units cannot be meant. Codes 0 to 3 are the larger \
+         format (A3, B), 4 to 127 the smaller one (A4, A). Unless a plotter is named in the options, its scaling points and \
+         hard clip limits are taken."
     SEVERAL_PAGES = 214 "H0214" Note "several pages"
         "The file draws on more than one sheet. Each is a page of its own."
     DEGENERATE_ARC = 215 "H0215" Note "arc that is none"
@@ -143,6 +145,13 @@ codes! {
     UNKNOWN_CHARACTER_SET = 224 "H0224" Note "character set not known"
         "CS, CA, SD or AD names a character set that is not built in. ISO 8859-1 is taken; bytes above 127, and a few signs \
          below, may come out as other characters than were meant."
+    CUT_AT_PAGE = 225 "H0225" Warning "cut at the page"
+        "Ink outside the page that PS sets is not drawn, as on a plotter of HP-GL/2. If it should be, the lengths of PS are too \
+         small, or in the wrong order: the first one is along x."
+    ASSUMED_PLOTTER = 226 "H0226" Note "scaling points assumed"
+        "SC maps user units to the scaling points P1 and P2, and the file does not say where they are. Those of the plotter \
+         named in the options are taken, else of a 7475A with A4 paper, or the corners of the page in HP-GL/2. The size of the \
+         drawing hangs on it; its shape does as far as the proportions differ."
 }
 
 #[cfg(test)]

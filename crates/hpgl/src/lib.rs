@@ -28,12 +28,14 @@ mod profile;
 mod syntax;
 mod units;
 
+use std::collections::BTreeMap;
+
 pub use diagnostics::{Code, Diagnostic, Severity};
-pub use drawing::{Drawing, Point, Span};
-pub use emit::{EmitOptions, emit};
+pub use drawing::{Drawing, Pen, Point, Span};
+pub use emit::{EmitOptions, Encoding, emit};
 pub use interpreter::interpret;
 pub use mnemonics::all as known_commands;
-pub use profile::Options;
+pub use profile::{Options, Paper, Plotter, plotters};
 pub use syntax::{Command, Mnemonic, Syntax};
 pub use units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
 
@@ -53,6 +55,22 @@ pub struct Reading {
 pub struct Page {
     /// Its ink; mm, y up, the origin where the file has it.
     pub drawing: Drawing,
+    /// What the file says about each pen that draws on it.
+    pub pens: BTreeMap<Pen, PenSettings>,
+}
+
+/// What a file says about a pen. Where it says different things in the course of a page, the least speed, force and
+/// acceleration, and the last width.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PenSettings {
+    /// Speed with the pen down, mm/s (`VS`).
+    pub speed_mm_s: Option<f64>,
+    /// Force in the plotter's own steps (`FS`).
+    pub force: Option<f64>,
+    /// Acceleration in the plotter's own steps (`AS`).
+    pub acceleration: Option<f64>,
+    /// Width of the line, mm (`PW`).
+    pub width_mm: Option<f64>,
 }
 
 /// What a file consists of.

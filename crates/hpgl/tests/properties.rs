@@ -1,6 +1,6 @@
 //! What holds for any bytes at all.
 
-use hpgl::{EmitOptions, Options, emit, interpret, parse, read};
+use hpgl::{EmitOptions, Encoding, Options, emit, interpret, parse, read};
 use proptest::prelude::*;
 
 /// Bytes that look like the language often enough to get deep into it.
@@ -72,7 +72,8 @@ proptest! {
     /// What is emitted reads back as what was emitted: the second time round nothing changes any more.
     #[test]
     fn emitting_is_a_fixed_point(bytes in almost_hpgl()) {
-        let options = EmitOptions::default();
+        for encoding in [Encoding::Decimal, Encoding::Base64, Encoding::Base32] {
+        let options = EmitOptions { encoding, ..EmitOptions::default() };
         for page in read(&bytes, &Options::default()).pages {
             let first = emit(&page.drawing, &options);
             let again = check(&first);
@@ -85,6 +86,7 @@ proptest! {
             prop_assert_eq!(String::from_utf8_lossy(&first), String::from_utf8_lossy(&second));
             let third = check(&second);
             prop_assert_eq!(drawing, &third.pages[0].drawing);
+        }
         }
     }
 }

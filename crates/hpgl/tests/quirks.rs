@@ -368,7 +368,7 @@ fn scales() {
     check(b"IN;SP1;SC0,1;PD400,0;", &["1: 0,0 400,0"], &["H0203"]);
     check(b"IN;SP1;IP0,0,0,1000;SC0,1,0,1;PD1,1;", &["1: 0,0 1,1000"], &["H0209"]);
     // A scale that no paper holds.
-    check(b"IN;SP1;SC0,1e-9,0,1e-9;PD1,1;SC;PD400,0;", &["1: 0,0 400,0"], &["H0207"]);
+    check(b"IN;SP1;IP0,0,9,9;SC0,1e-9,0,1e-9;PD1,1;SC;PD400,0;", &["1: 0,0 400,0"], &["H0207"]);
     // From P1 at the upper left, y down: what drafting programs write.
     check(
         b"BP;IN;PS11056,7977;RO90;IP0,0,1016,-1016;IR0,100;SC0,300,0,300;SP1;PA0,0;PD300,0,300,300;PU;",
@@ -402,7 +402,7 @@ fn windows() {
         &["H0210"],
     );
     // The page that PS sets clips, a default one does not.
-    check(b"IN;SP1;PS4000,2000;PD4000,0,5000,0;", &["1: 0,0 4000,0"], &["H0210"]);
+    check(b"IN;SP1;PS4000,2000;PD4000,0,5000,0;", &["1: 0,0 4000,0"], &["H0225"]);
     check(b"IN;SP1;PD40000,0;", &["1: 0,0 40000,0"], &[]);
     check(b"IN;SP1;IW5,5,5,9;PD400,0;IW;PD400,400;", &["1: 400,0 400,400"], &["H0211", "H0210"]);
     // A window in user units moves with the scaling points.
@@ -503,4 +503,40 @@ fn strokes_know_their_bytes() {
     let reading = reading(file);
     let source = reading.pages[0].drawing.strokes[0].source;
     assert_eq!(&file[source.start..source.end], b"PD400,0;PA400,400;");
+}
+
+#[test]
+fn pens_and_what_the_file_says_about_them() {
+    let reading = reading(b"IN;SP1;VS20;PW.5;PD400,0;VS10,2;FS3,2;SP2;PD400,400;SP3;PD0,0;");
+    let pens = &reading.pages[0].pens;
+    assert_eq!(pens.len(), 3);
+    let of = |pen| pens[&hpgl::Pen(pen)];
+    assert_eq!((of(1).speed_mm_s, of(1).width_mm, of(1).force), (Some(200.0), Some(0.5), None));
+    assert_eq!((of(2).speed_mm_s, of(2).force), (Some(100.0), Some(3.0)));
+    assert_eq!(of(3).speed_mm_s, Some(200.0));
+    // The gentlest speed that the pen was ever told while it drew.
+    let slow = crate::reading(b"IN;SP1;VS5;VS20;PD400,0;VS10;PD400,400;VS30;PU;");
+    assert_eq!(slow.pages[0].pens[&hpgl::Pen(1)].speed_mm_s, Some(100.0));
+    // Percent of the diagonal, 25 mm.
+    let wide = crate::reading(b"IN;SP1;IP0,0,600,800;WU1;PW2;PD400,0;");
+    assert_eq!(wide.pages[0].pens[&hpgl::Pen(1)].width_mm, Some(0.5));
+}
+
+#[test]
+fn the_file_chooses_its_plotter() {
+    // No IP: the scaling points of the 7475A on A4, on A3 where PS says so, the corners of the page in HP-GL/2.
+    let scaled =
+        |setup: &str, rest: &str| reading(format!("{setup}IN;{rest}SP1;SC0,1,0,1;PA0,0;PD1,1;").as_bytes());
+    assert_eq!(ink(&scaled("", "")), ["1: 603,521 10603,7721"]);
+    assert_eq!(codes(&scaled("", "")), ["H0226"]);
+    assert_eq!(ink(&scaled("", "PS0;")), ["1: 170,602 15370,10602"]);
+    assert_eq!(ink(&scaled("", "PS4;")), ["1: 603,521 10603,7721"]);
+    assert_eq!(ink(&scaled("\x1b%0B", "")), ["1: 0,0 11040,7721"]);
+    assert_eq!(ink(&scaled("BP;", "PS4000,2000;")), ["1: 0,0 4000,2000"]);
+    assert_eq!(codes(&scaled("BP;", "PS4000,2000;")), [""; 0]);
+    // A plotter named in the options stays.
+    let options = Options::for_plotter("hp7475a", Some("a3")).expect("built in");
+    let reading = read(b"IN;PS4;SP1;SC0,1,0,1;PA0,0;PD1,1;", &options);
+    let end = reading.pages[0].drawing.strokes[0].end();
+    assert!((end.x - 15370.0 * hpgl::PLOTTER_UNIT_7475A_MM).abs() < 1e-9);
 }

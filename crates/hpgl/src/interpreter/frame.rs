@@ -8,7 +8,7 @@
 
 use drawing::{Affine, Point, Rect, Vec2};
 
-use crate::profile::Options;
+use crate::profile::{Options, Paper};
 
 /// The ranges that `SC` gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +77,8 @@ pub(crate) struct Frame {
     /// Unless the file set a page, its edges do not clip; a page of one length is open towards y.
     page_clip: Option<Rect>,
     page_set: bool,
+    /// P1 and P2 are those of the plotter, by nobody's word.
+    points_assumed: bool,
     p1: Point,
     p2: Point,
     scale: Option<Scale>,
@@ -98,6 +100,7 @@ impl Frame {
             hard_clip: options.hard_clip,
             page_clip: None,
             page_set: false,
+            points_assumed: true,
             p1: options.scaling_points.0,
             p2: options.scaling_points.1,
             scale: None,
@@ -249,6 +252,7 @@ impl Frame {
 
     /// Sets P1 and P2, and says whether they had to be moved apart.
     pub(crate) fn set_points(&mut self, p1: Point, p2: Point) -> bool {
+        self.points_assumed = false;
         let meet = (p1.x == p2.x, p1.y == p2.y);
         self.p1 = p1;
         self.p2 = p2 + Vec2::new(f64::from(u8::from(meet.0)), f64::from(u8::from(meet.1)));
@@ -258,6 +262,7 @@ impl Frame {
 
     /// The default P1 and P2 of the current rotation: corners of the page where the file set one, else the plotter's.
     pub(crate) fn reset_points(&mut self) {
+        self.points_assumed = !self.page_set;
         let (p1, p2) = if self.page_set {
             (
                 Point::new(self.hard_clip.x0, self.hard_clip.y0),
@@ -300,6 +305,36 @@ impl Frame {
         self.page_set = true;
         self.window = None;
         self.reset_points();
+    }
+
+    /// Takes paper of a plotter: the default P1 and P2, and the area that the pen reaches.
+    pub(crate) fn set_paper(&mut self, paper: &Paper) {
+        let [x1, y1, x2, y2] = paper.scaling_points;
+        let [left, bottom, right, top] = paper.hard_clip;
+        self.default_points = (Point::new(x1, y1), Point::new(x2, y2));
+        self.hard_clip = Rect::new(left, bottom, right, top);
+        if self.points_assumed {
+            self.reset_points();
+        }
+    }
+
+    /// The default P1 and P2 are the corners of the area that the pen reaches, as in HP-GL/2.
+    pub(crate) fn use_corners(&mut self) {
+        let Rect { x0, y0, x1, y1 } = self.hard_clip;
+        self.default_points = (Point::new(x0, y0), Point::new(x1, y1));
+        if self.points_assumed {
+            self.reset_points();
+        }
+    }
+
+    /// Whether P1 and P2 are those of a plotter that the file does not name.
+    pub(crate) fn points_are_assumed(&self) -> bool {
+        self.points_assumed
+    }
+
+    /// Whether the file set a window.
+    pub(crate) fn has_window(&self) -> bool {
+        self.window.is_some()
     }
 
     /// Makes an area of that size the page without clipping to it.

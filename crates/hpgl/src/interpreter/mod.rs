@@ -7,6 +7,7 @@ mod frame;
 mod label;
 mod line_type;
 mod pages;
+mod pens;
 mod polygon;
 mod setup;
 mod ticks;
@@ -25,6 +26,7 @@ use characters::Characters;
 use fill::FillType;
 use frame::Frame;
 use line_type::LineType;
+use pens::Pens;
 use polygon::Polygon;
 use ticks::Ticks;
 use tracer::Tracer;
@@ -79,6 +81,8 @@ pub(crate) struct Interpreter {
     line_type: LineType,
     ticks: Ticks,
     characters: Characters,
+    pens: Pens,
+    automatic: bool,
     /// Where carriage returns lead, plotter units.
     margin: Point,
     /// Where the last label left the pen: if it is elsewhere, it has moved since.
@@ -118,6 +122,8 @@ impl Interpreter {
             line_type: LineType::default(),
             ticks: Ticks::default(),
             characters: Characters::default(),
+            pens: Pens::default(),
+            automatic: options.automatic,
             margin: Point::ZERO,
             label_end: None,
             label_buffer: (Vec::new(), 0),
@@ -204,6 +210,11 @@ impl Interpreter {
             b"TL" => self.tick_length(p),
             b"XT" => self.x_tick(),
             b"YT" => self.y_tick(),
+            b"VS" => self.pen_speed(p),
+            b"FS" => self.pen_force(p),
+            b"AS" => self.pen_acceleration(p),
+            b"PW" => self.pen_width(p),
+            b"WU" => self.width_unit(p),
             b"SP" => self.select_pen(p),
             b"IN" => self.initialise(),
             b"DF" => self.set_defaults(),
@@ -239,13 +250,18 @@ impl Interpreter {
             | b"OS" | b"OT" | b"OW" | b"DP" | b"DC" => {
                 self.report(codes::OUTPUT_COMMAND, || format!("`{mnemonic}` has no meaning in a file"));
             }
+            _ if mnemonic == Mnemonic::ENTER => self.enter_hpgl2(),
             _ if mnemonic == Mnemonic::RESET => self.reset(),
             _ if mnemonic == Mnemonic::PICTURE_FRAME => self.picture_frame(p),
             _ => {}
         }
         self.report_given_up_dashes();
         for _ in 0..self.tracer.take_clipped() {
-            self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
+            if self.frame.has_window() {
+                self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
+            } else {
+                self.report(codes::CUT_AT_PAGE, || "ink outside the page that PS sets is cut off".into());
+            }
         }
     }
 
@@ -262,11 +278,13 @@ impl Interpreter {
                 self.report(codes::PEN_PUT_AWAY, || "the pen is put away (SP0): nothing is drawn".into());
             }
         }
+        self.note_pen();
     }
 
     fn hold(&mut self, pen: u16) {
         self.holder = if pen == 0 { Holder::Empty } else { Holder::Holds(pen) };
         self.tracer.set_pen(Pen(pen));
+        self.pens.touch();
     }
 
     /// Puts the pen at a place without drawing.
@@ -318,7 +336,7 @@ impl Interpreter {
         }
         let strokes = self.tracer.take_page();
         if !strokes.is_empty() || self.pages.is_empty() {
-            self.pages.push(Page { drawing: Drawing { strokes } });
+            self.pages.push(Page { drawing: Drawing { strokes }, pens: self.pens.take_used() });
         }
         self.settle_ink_of_no_pen();
         self.report_pages();

@@ -13,7 +13,7 @@ impl Interpreter {
             return;
         }
         let strokes = self.tracer.take_page();
-        self.pages.push(Page { drawing: Drawing { strokes } });
+        self.pages.push(Page { drawing: Drawing { strokes }, pens: self.pens.take_used() });
     }
 
     /// `PG` and its like: a new sheet; coordinates go on.
@@ -26,7 +26,15 @@ impl Interpreter {
     /// `BP`: a new plot on a new sheet, with everything as at the start.
     pub(super) fn begin_plot(&mut self) {
         self.advance_page();
+        self.enter_hpgl2();
         self.initialise();
+    }
+
+    /// The file is HP-GL/2: P1 and P2 are the corners of the page unless told otherwise.
+    pub(super) fn enter_hpgl2(&mut self) {
+        if self.automatic {
+            self.frame.use_corners();
+        }
     }
 
     /// A reset of the printer, or the end of its job.

@@ -9,6 +9,7 @@ use super::line_type::LineType;
 use super::ticks::Ticks;
 use super::{Holder, Interpreter};
 use crate::codes;
+use crate::profile::paper_of_code;
 
 /// `PS` with one number up to this is the code of a paper format (7475A, 7550A); more is a length in plotter units.
 const LARGEST_PAPER_CODE: f64 = 130.0;
@@ -123,6 +124,15 @@ impl Interpreter {
             self.report(codes::BAD_SCALE, || "`SC` names a range without extent; it has no effect".into());
             return;
         }
+        if scale.is_some() && self.frame.points_are_assumed() {
+            let (p1, p2) = self.frame.points();
+            self.report(codes::ASSUMED_PLOTTER, || {
+                format!(
+                    "no IP says where P1 and P2 are: ({}, {}) and ({}, {}) are taken",
+                    p1.x, p1.y, p2.x, p2.y
+                )
+            });
+        }
         self.frame.set_scale(scale);
         self.frame_changed();
     }
@@ -162,9 +172,12 @@ impl Interpreter {
         match *p {
             [] => {}
             [code] if code <= LARGEST_PAPER_CODE => {
-                self.report(codes::PAPER_CODE, || {
-                    format!("PS{code} is a paper format; the page is not changed")
-                });
+                self.report(codes::PAPER_CODE, || format!("PS{code} is the code of a paper format"));
+                if self.automatic {
+                    self.frame.set_paper(paper_of_code(code));
+                    self.frame_changed();
+                    self.place(self.position);
+                }
             }
             [length] => self.set_page(length, None),
             [length, width, ..] if length > LARGEST_PAPER_CODE && width > LARGEST_PAPER_CODE => {

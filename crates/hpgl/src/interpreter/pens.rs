@@ -1,0 +1,116 @@
+//! What the file says about its pens: `VS FS AS PW WU`.
+
+use std::collections::BTreeMap;
+
+use super::{Holder, Interpreter};
+use crate::PenSettings;
+use drawing::Pen;
+
+/// Settings for all pens, and for single ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Pens {
+    all: PenSettings,
+    single: BTreeMap<Pen, PenSettings>,
+    /// Pen widths are in percent of the diagonal between P1 and P2 instead of mm.
+    relative_widths: bool,
+    /// What the pens that drew had, on this page.
+    used: BTreeMap<Pen, PenSettings>,
+    /// Nothing has changed since the last ink.
+    noted: bool,
+}
+
+impl Pens {
+    /// Settings may have changed: the next ink looks them up again.
+    pub(super) fn touch(&mut self) {
+        self.noted = false;
+    }
+
+    /// The settings of the pens that drew since this was last asked.
+    pub(super) fn take_used(&mut self) -> BTreeMap<Pen, PenSettings> {
+        self.noted = false;
+        std::mem::take(&mut self.used)
+    }
+
+    fn note(&mut self, pen: Pen) {
+        let now = self.single.get(&pen).copied().unwrap_or(self.all);
+        self.used
+            .entry(pen)
+            .and_modify(|before| {
+                // One speed a pen is what can be honoured: the gentlest that it was ever told.
+                let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
+                *before = PenSettings {
+                    speed_mm_s: least(before.speed_mm_s, now.speed_mm_s),
+                    force: least(before.force, now.force),
+                    acceleration: least(before.acceleration, now.acceleration),
+                    width_mm: now.width_mm.or(before.width_mm),
+                };
+            })
+            .or_insert(now);
+        self.noted = true;
+    }
+
+    /// Changes a setting of one pen, or of all.
+    fn set(&mut self, pen: Option<f64>, change: impl Fn(&mut PenSettings)) {
+        self.noted = false;
+        match pen {
+            Some(pen) if (1.0..=f64::from(u16::MAX)).contains(&pen) => {
+                change(self.single.entry(Pen(pen as u16)).or_insert(self.all));
+            }
+            Some(_) => {}
+            None => {
+                change(&mut self.all);
+                self.single.values_mut().for_each(change);
+            }
+        }
+    }
+}
+
+impl Interpreter {
+    /// Notes what the pen that draws now was told.
+    #[inline]
+    pub(super) fn note_pen(&mut self) {
+        if !self.pens.noted
+            && let Holder::Holds(pen) = self.holder
+        {
+            self.pens.note(Pen(pen));
+        }
+    }
+
+    /// `VS`: speed in cm/s.
+    pub(super) fn pen_speed(&mut self, p: &[f64]) {
+        let speed = p.first().filter(|&&cm_s| cm_s > 0.0).map(|cm_s| cm_s * 10.0);
+        self.pens.set(p.get(1).copied(), |settings| settings.speed_mm_s = speed);
+    }
+
+    /// `FS`: force, in the plotter's own steps.
+    pub(super) fn pen_force(&mut self, p: &[f64]) {
+        let force = p.first().copied();
+        self.pens.set(p.get(1).copied(), |settings| settings.force = force);
+    }
+
+    /// `AS`: acceleration, in the plotter's own steps.
+    pub(super) fn pen_acceleration(&mut self, p: &[f64]) {
+        let acceleration = p.first().copied();
+        self.pens.set(p.get(1).copied(), |settings| settings.acceleration = acceleration);
+    }
+
+    /// `PW`: width, in mm or as `WU` says.
+    pub(super) fn pen_width(&mut self, p: &[f64]) {
+        let (p1, p2) = self.frame.points();
+        let unit = if self.pens.relative_widths {
+            (p2 - p1).hypot2().sqrt() * self.frame.unit_mm() / 100.0
+        } else {
+            1.0
+        };
+        let width = p.first().filter(|&&width| width > 0.0).map(|width| width * unit);
+        self.pens.set(p.get(1).copied(), |settings| settings.width_mm = width);
+        self.apply_line_type();
+    }
+
+    /// `WU`: what widths are measured in; widths set before are forgotten.
+    pub(super) fn width_unit(&mut self, p: &[f64]) {
+        self.pens.relative_widths = p.first() == Some(&1.0);
+        self.pens.set(None, |settings| settings.width_mm = None);
+        self.apply_line_type();
+    }
+}
