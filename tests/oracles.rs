@@ -42,8 +42,8 @@ mod coaxial {
         [th1.to_degrees(), th2.to_degrees()]
     }
 
-    /// Counts of both motors. The report subtracts the first arm's last move, th1 - th1_previous, from th2, and begins at
-    /// th1_previous = 90; what the belt needs is the whole way from there, which is the same for a first point.
+    /// Counts of both motors. The report subtracts the first arm's last move, `th1 - th1_previous`, from th2, and begins
+    /// with `th1_previous` = 90; what the belt needs is the whole way from there, which is the same for a first point.
     fn counts([th1, th2]: [f64; 2]) -> [f64; 2] {
         [CPR / 360.0 * th1, CPR / 360.0 * (th2 - (th1 - 90.0))]
     }

@@ -34,13 +34,16 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
     Ok(Input { name, bytes })
 }
 
+/// Why `--strict` refuses.
+pub(crate) const STRICT: &str = "there are warnings, and --strict takes them for errors";
+
 /// Reads a drawing and says what there is to say about it. With `strict` a warning refuses it.
 pub(crate) fn drawing(input: &Input, strict: bool) -> Result<Reading, Failure> {
     let reading = hpgl::read(&input.bytes, &hpgl::Options::default());
     terminal::diagnostics(input, &reading.diagnostics);
     let warned = reading.diagnostics.iter().any(|diagnostic| diagnostic.severity >= Severity::Warning);
     if strict && warned {
-        terminal::error("there are warnings, and --strict takes them for errors");
+        terminal::error(STRICT);
         return Err(Failure::Refused);
     }
     Ok(reading)

@@ -108,10 +108,9 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
     let strokes = compiled.placed.strokes.len();
     let _ = write!(
         text,
-        "{}: {} stroke{}, {} of ink",
+        "{}: {}, {} of ink",
         machine.name(),
-        strokes,
-        if strokes == 1 { "" } else { "s" },
+        counted(strokes, "stroke"),
         metres(certificate.ink_mm)
     );
     if compiled.strokes != strokes {
@@ -196,6 +195,11 @@ fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
         spread(&deviation.ink_to_drawing),
         spread(&deviation.drawing_to_ink)
     );
+}
+
+/// So many of a thing, for people.
+pub fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
 /// A length for people.

@@ -32,7 +32,11 @@ pub(crate) fn warning(message: &str) {
 }
 
 fn render(report: &[Group<'_>]) {
-    say(&format!("{}\n", Renderer::styled().render(report)));
+    let text = Renderer::styled().render(report);
+    // A window of a line has its place from an origin, and is then marked as another file's that has no name.
+    let is_mark = |line: &&str| anstream::adapter::strip_str(line).to_string().trim() == ":::";
+    let lines: Vec<&str> = text.lines().filter(|line| !is_mark(line)).collect();
+    say(&format!("{}\n", lines.join("\n")));
 }
 
 /// Prints diagnostics, each with its place in the file.

@@ -1,8 +1,10 @@
 //! `plotplan check`: what a file says, and what would not plot.
 
+use std::fmt::Write as _;
+
 use hpgl::Severity;
 use planner::placement;
-use plotplan::report::metres;
+use plotplan::report::{counted, metres};
 
 use crate::cli::Check;
 use crate::failure::Failure;
@@ -17,19 +19,22 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     for (number, page) in reading.pages.iter().enumerate() {
         let drawing = &page.drawing;
         if reading.pages.len() > 1 {
-            text.push_str(&format!("page {}: ", number + 1));
+            let _ = write!(text, "page {}: ", number + 1);
         }
         match drawing.bounding_box() {
-            Some(bounds) => text.push_str(&format!(
-                "{} strokes, {} of ink from {:.2}, {:.2} to {:.2}, {:.2} mm, pens {}\n",
-                drawing.strokes.len(),
-                metres(drawing.length()),
-                bounds.x0,
-                bounds.y0,
-                bounds.x1,
-                bounds.y1,
-                drawing.pens().iter().map(|pen| pen.0.to_string()).collect::<Vec<_>>().join(", ")
-            )),
+            Some(bounds) => {
+                let _ = writeln!(
+                    text,
+                    "{}, {} of ink from {:.2}, {:.2} to {:.2}, {:.2} mm, pens {}",
+                    counted(drawing.strokes.len(), "stroke"),
+                    metres(drawing.length()),
+                    bounds.x0,
+                    bounds.y0,
+                    bounds.x1,
+                    bounds.y1,
+                    drawing.pens().iter().map(|pen| pen.0.to_string()).collect::<Vec<_>>().join(", ")
+                );
+            }
             None => text.push_str("no ink\n"),
         }
     }
@@ -47,7 +52,10 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
                 let beyond = placement::beyond_sheet(&machine.machine, &placed);
                 if beyond > 1e-6 {
                     terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));
-                    refused |= arguments.strict;
+                    if arguments.strict {
+                        terminal::error(input::STRICT);
+                        refused = true;
+                    }
                 }
             }
             Err(error) => match super::convert::explain(&input, drawing, &machine.machine, &request, error) {

@@ -67,6 +67,7 @@ fn plan(
             compiled.beyond_sheet_mm
         ));
         if arguments.strict {
+            terminal::error(input::STRICT);
             return Err(Failure::Refused);
         }
     }

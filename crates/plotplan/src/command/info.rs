@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use plotplan::report::{self, clock, metres};
+use plotplan::report::{self, clock, counted, metres};
 
 use crate::cli::Info;
 use crate::failure::Failure;
@@ -37,7 +37,7 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
             continue;
         };
         let dots = drawing.strokes.iter().filter(|stroke| stroke.is_dot()).count();
-        let _ = writeln!(text, "strokes  {} ({dots} dots)", drawing.strokes.len());
+        let _ = writeln!(text, "strokes  {} ({})", drawing.strokes.len(), counted(dots, "dot"));
         let _ = writeln!(text, "ink      {}", metres(drawing.length()));
         let _ = writeln!(
             text,
@@ -52,7 +52,7 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         for pen in drawing.pens() {
             let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
             let (count, length) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
-            let _ = writeln!(text, "pen {:<4} {count} strokes, {}", pen.0, metres(length));
+            let _ = writeln!(text, "pen {:<4} {}, {}", pen.0, counted(count, "stroke"), metres(length));
         }
     }
     if let Some(machine) = machine {

@@ -1,0 +1,616 @@
+//! The program as people and scripts meet it: every command, its words, its exit codes, and what it leaves behind.
+
+use std::fs;
+use std::io::Read as _;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use assert_cmd::cargo::cargo_bin;
+use tempfile::TempDir;
+
+/// A line with a corner, a circle, a line of a second pen, a dot: 30 mm x 25 mm, within reach of every preset.
+const TINY: &str = "IN;SP1;\nPU400,400;PD1200,400,1200,1000;\nPU800,800;CI200;\nSP2;PU200,1000;PD200,600;\nPU300,900;PD;PU;\nSP0;\n";
+/// A line of half a metre.
+const LARGE: &str = "IN;SP1;PU400,400;PD1200,400;PU;PA20000,0;PD;PA400,400;PU;SP0;";
+const TWO_PAGES: &str = "IN;SP1;PU40,40;PD400,40;PU;PG;SP3;PU40,40;PD40,400,800,400;PU;PG;";
+const PRESETS: [&str; 5] = ["coaxial", "corexy", "hbot", "polar", "cartesian"];
+
+/// A folder with some files, in which the program runs.
+struct Desk {
+    folder: TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let desk = Self { folder: TempDir::new().expect("a temporary folder") };
+        desk.put("tiny.hpgl", TINY);
+        desk.put("large.hpgl", LARGE);
+        desk
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn put(&self, name: &str, text: &str) {
+        fs::write(self.path().join(name), text).expect("a file can be written");
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path().join(name)).expect(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        String::from_utf8(self.bytes(name)).expect("text")
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.path()).expect("the folder can be read");
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn command(&self, arguments: &str) -> Command {
+        let mut command = Command::new(cargo_bin!("plotplan"));
+        command.current_dir(self.path()).args(arguments.split_whitespace());
+        // The width of help and the use of colour are the terminal's business.
+        command.env("COLUMNS", "100").env_remove("CLICOLOR_FORCE").env_remove("NO_COLOR");
+        command
+    }
+
+    fn run(&self, arguments: &str) -> Said {
+        self.run_with(arguments, "")
+    }
+
+    fn run_with(&self, arguments: &str, input: &str) -> Said {
+        let mut command = assert_cmd::Command::from_std(self.command(arguments));
+        Said::of(command.write_stdin(input).output().expect("the program runs"))
+    }
+
+    /// Runs it and gives what it wrote; it has to succeed.
+    fn good(&self, arguments: &str) -> Said {
+        let said = self.run(arguments);
+        assert_eq!(said.code, 0, "plotplan {arguments}\n{}", said.err);
+        said
+    }
+
+    /// What was said and how it ended, for a snapshot.
+    fn transcript(&self, arguments: &[&str]) -> String {
+        let of = |arguments: &&str| {
+            let Said { code, out, err } = self.run(arguments);
+            format!("$ plotplan {arguments}\n{}{err}[{code}]\n", String::from_utf8_lossy(&out))
+        };
+        arguments.iter().map(of).collect::<Vec<_>>().join("\n")
+    }
+}
+
+struct Said {
+    code: i32,
+    out: Vec<u8>,
+    err: String,
+}
+
+impl Said {
+    fn of(output: Output) -> Self {
+        Self {
+            code: output.status.code().expect("it ends by itself"),
+            out: output.stdout,
+            err: String::from_utf8(output.stderr).expect("text"),
+        }
+    }
+
+    fn text(&self) -> &str {
+        std::str::from_utf8(&self.out).expect("text")
+    }
+}
+
+#[test]
+fn wrong_words_end_with_2() {
+    let desk = Desk::new();
+    desk.put("sped.toml", &desk.good("machine show coaxial").text().replacen("max_speed", "max_sped", 1));
+    desk.put("singular.toml", &desk.good("machine show corexy").text().replacen("[1, -1]", "[2, 2]", 1));
+    let said = desk.transcript(&[
+        "convert tiny.hpgl",
+        "convert tiny.hpgl --machine coxial",
+        "convert tiny.hpgl --machine typewriter",
+        "convert tiny.hpgl --machine sped.toml",
+        "convert tiny.hpgl --machine singular.toml",
+        "convert tiny.hpgl --machine coaxial --tolerance 3parsec",
+        "convert tiny.hpgl --machine coaxial --tolerance 0",
+        "convert tiny.hpgl --machine coaxial --period 10",
+        "convert tiny.hpgl --machine coaxial --period 0ms",
+        "convert tiny.hpgl --machine coaxial --place 1in",
+        "convert tiny.hpgl --machine coaxial --scale -1",
+        "convert tiny.hpgl --machine coaxial --rotate nan",
+        "convert tiny.hpgl --machine coaxial --fit --scale 2",
+        "convert tiny.hpgl --machine coaxial --format gcode",
+        "convert",
+        "preview tiny.hpgl --output tiny.gif",
+        "machine show coxial",
+        "explain H9999",
+    ]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn what_cannot_be_read_or_written_ends_with_3() {
+    let desk = Desk::new();
+    let before = desk.names();
+    for arguments in [
+        "convert nosuch.hpgl --machine coaxial",
+        "check nosuch.hpgl",
+        "info nosuch.hpgl",
+        "verify nosuch.csv",
+        "verify tiny.csv --drawing nosuch.hpgl",
+        "preview nosuch.hpgl --output x.svg",
+        "convert tiny.hpgl --machine nosuch.toml",
+        "machine check nosuch.toml",
+        "convert tiny.hpgl --machine coaxial --output nosuch/x.ticks",
+        "convert tiny.hpgl --format svg --output nosuch/x.svg",
+        "preview tiny.hpgl --output nosuch/x.png",
+    ] {
+        if arguments.contains("tiny.csv") {
+            desk.good("convert tiny.hpgl --machine cartesian --format csv --output tiny.csv");
+        }
+        let said = desk.run(arguments);
+        assert_eq!(said.code, 3, "plotplan {arguments}\n{}", said.err);
+        assert!(said.err.starts_with("error: cannot ") && said.err.contains("nosuch"), "{}", said.err);
+        assert!(!said.err.contains(".plotplan-"), "names a temporary file: {}", said.err);
+        assert!(said.out.is_empty());
+        let _ = fs::remove_file(desk.path().join("tiny.csv"));
+        assert_eq!(desk.names(), before, "plotplan {arguments} leaves something behind");
+    }
+}
+
+#[test]
+fn drawings_that_cannot_be_planned_end_with_1() {
+    let desk = Desk::new();
+    desk.put("empty.hpgl", "");
+    desk.put("letter.txt", "Dear plotter, please draw a house.\n");
+    desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
+    desk.put("plan.csv", desk.good("convert tiny.hpgl -m cartesian -f csv").text());
+    let said = desk.transcript(&[
+        "convert empty.hpgl --machine coaxial",
+        "convert letter.txt --machine coaxial",
+        "convert plan.csv --machine coaxial",
+        "convert large.hpgl --machine coaxial",
+        "convert large.hpgl --machine polar",
+        "convert large.hpgl --machine corexy --rotate 45",
+        "convert quirk.hpgl --machine coaxial --strict",
+        "convert tiny.hpgl --machine coaxial --place -11mm,0 --strict",
+        "verify tiny.hpgl",
+    ]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn a_refused_plan_leaves_an_output_file_as_it_was() {
+    let desk = Desk::new();
+    desk.put("plan.ticks", "as it was");
+    let before = desk.names();
+    let said = desk.run("convert large.hpgl --machine coaxial --output plan.ticks");
+    assert_eq!(said.code, 1);
+    assert_eq!(desk.text("plan.ticks"), "as it was");
+    assert_eq!(desk.names(), before);
+    assert_eq!(desk.run("convert large.hpgl --machine coaxial --output new.ticks").code, 1);
+    assert_eq!(desk.names(), before, "no file is written for a plan that was refused");
+    let said = desk.good("convert large.hpgl --machine coaxial --fit --output plan.ticks");
+    assert!(said.out.is_empty(), "the plan is in the file, not on standard output");
+    assert!(desk.text("plan.ticks").starts_with("; plotplan: 1\n"));
+    assert_eq!(desk.names(), before);
+}
+
+#[test]
+fn strict_takes_warnings_for_errors_and_nothing_else() {
+    let desk = Desk::new();
+    desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
+    for command in
+        ["convert quirk.hpgl --machine cartesian", "convert quirk.hpgl --format svg", "check quirk.hpgl"]
+    {
+        let said = desk.good(command);
+        assert!(said.err.contains("warning"), "{}", said.err);
+        let said = desk.run(&format!("{command} --strict"));
+        assert_eq!(said.code, 1, "plotplan {command} --strict");
+        assert!(said.out.is_empty(), "plotplan {command} --strict");
+    }
+    desk.good("convert tiny.hpgl --machine cartesian --strict");
+    // Ink beside the sheet is a warning of the machine, not of the file.
+    let beside = "check tiny.hpgl --machine coaxial --place -11mm,0";
+    assert!(desk.good(beside).err.contains("ink reaches 6.00 mm beyond the sheet"));
+    let said = desk.run(&format!("{beside} --strict"));
+    assert_eq!(said.code, 1);
+    assert!(
+        said.err.ends_with("error: there are warnings, and --strict takes them for errors\n"),
+        "{}",
+        said.err
+    );
+}
+
+#[test]
+fn a_json_report_is_the_last_line_of_standard_error() {
+    let desk = Desk::new();
+    for machine in PRESETS {
+        let said = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv --report json"));
+        let last = said.err.lines().last().expect("a line");
+        let report: serde_json::Value = serde_json::from_str(last).expect("one JSON object");
+        assert_eq!(report["certificate"]["holds"], true, "{machine}");
+        assert_eq!(report["certificate"]["pens"], serde_json::json!([1, 2]), "{machine}");
+        assert_eq!(report["certificate"]["dots"], 1, "{machine}");
+        assert_eq!(report["summary"]["strokes"], 4, "{machine}");
+        // 20 mm + 15 mm, the circle, 10 mm; the pen's path may be shorter by what the tolerance lets it cut.
+        let ink = report["summary"]["ink_mm"].as_f64().expect("a number");
+        let drawn = 45.0 + 10.0 * std::f64::consts::PI;
+        assert!(ink > drawn - 1.0 && ink < drawn + 0.1, "{machine}: {ink} of {drawn} mm");
+        let rows = said.text().lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())).count();
+        assert_eq!(report["summary"]["rows"], rows, "{machine}");
+    }
+}
+
+#[test]
+fn a_minus_is_standard_input_and_standard_output() {
+    let desk = Desk::new();
+    let from_file = desk.good("convert tiny.hpgl --machine hbot");
+    let piped = desk.run_with("convert - --machine hbot --output -", TINY);
+    assert_eq!((piped.code, &piped.err), (0, &from_file.err));
+    assert_eq!(piped.out, from_file.out);
+    let plan = piped.text();
+    for reader in ["verify - --drawing tiny.hpgl", "info -", "preview - --output plan.svg"] {
+        let said = desk.run_with(reader, plan);
+        assert_eq!(said.code, 0, "plotplan {reader}\n{}", said.err);
+    }
+    assert_eq!(desk.run_with("check -", TINY).code, 0);
+    assert!(desk.text("plan.svg").contains("<svg"));
+}
+
+#[test]
+fn the_same_drawing_gives_the_same_bytes() {
+    let desk = Desk::new();
+    for format in ["ticks", "csv", "json", "hpgl", "svg"] {
+        let command = format!("convert tiny.hpgl --machine polar --format {format}");
+        let (first, second) = (desk.good(&command), desk.good(&format!("{command} --output out")));
+        assert_eq!(first.out, desk.bytes("out"), "{format}");
+        assert_eq!(first.err, second.err, "{format}");
+        // Where the drawing lies is not part of the plan.
+        let absolute = desk.path().join("tiny.hpgl").display().to_string();
+        assert_eq!(desk.good(&command.replace("tiny.hpgl", &absolute)).out, first.out, "{format}");
+    }
+}
+
+#[test]
+fn whoever_has_read_enough_may_leave() {
+    let desk = Desk::new();
+    // More than a pipe holds, so that the program has to notice.
+    let command = "convert tiny.hpgl --machine cartesian --fit --period 1ms";
+    assert!(desk.good(command).out.len() > 200_000);
+    let mut program = desk.command(command);
+    let mut child = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
+    let mut out = child.stdout.take().expect("a pipe");
+    let mut some = [0; 100];
+    out.read_exact(&mut some).expect("the plan's beginning");
+    assert!(some.starts_with(b"; plotplan: 1\n"));
+    drop(out);
+    let Said { code, err, .. } = Said::of(child.wait_with_output().expect("it ends"));
+    assert_eq!((code, err.as_str()), (0, ""));
+}
+
+#[test]
+fn drawings_need_no_machine() {
+    let desk = Desk::new();
+    desk.good("convert tiny.hpgl --format hpgl --output clean.hpgl");
+    let clean = desk.text("clean.hpgl");
+    insta::assert_snapshot!("tiny_as_hpgl", clean);
+    let again = desk.good("convert clean.hpgl --format hpgl");
+    assert_eq!(again.text(), clean, "what was written plainly is written the same again");
+    let svg = desk.good("convert tiny.hpgl --format svg");
+    insta::assert_snapshot!("tiny_as_svg", svg.text());
+}
+
+#[test]
+fn a_shown_machine_is_the_machine() {
+    let desk = Desk::new();
+    for machine in PRESETS {
+        let shown = desk.good(&format!("machine show {machine}"));
+        desk.put("mine.toml", shown.text());
+        assert_eq!(desk.good("machine show mine.toml").out, shown.out, "{machine}");
+        for format in ["csv", "json"] {
+            let plan =
+                |name: &str| desk.good(&format!("convert tiny.hpgl --machine {name} --format {format}")).out;
+            assert_eq!(plan("mine.toml"), plan(machine), "{machine}, {format}");
+        }
+    }
+}
+
+#[test]
+fn machines_are_listed_and_checked() {
+    let desk = Desk::new();
+    let checks = PRESETS.map(|machine| format!("machine check {machine}"));
+    let mut commands = vec!["machine list"];
+    commands.extend(checks.iter().map(String::as_str));
+    let said = desk.transcript(&commands);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn a_plan_of_ones_own_machine_needs_its_file() {
+    let desk = Desk::new();
+    let mine = desk.good("machine show coaxial").text().replacen("\"coaxial\"", "\"mine\"", 1);
+    desk.put("mine.toml", &mine.replacen("\"206mm\"", "\"200mm\"", 1));
+    for format in ["ticks", "csv", "json"] {
+        desk.good(&format!("convert tiny.hpgl --machine mine.toml --format {format} --output plan"));
+        let alone = desk.run("verify plan --drawing tiny.hpgl");
+        if format == "json" {
+            assert_eq!(alone.code, 0, "a plan document has its machine in it\n{}", alone.err);
+        } else {
+            assert_eq!(alone.code, 2, "{}", alone.err);
+            assert!(alone.err.contains("there is no machine called mine"), "{}", alone.err);
+        }
+        desk.good("verify plan --drawing tiny.hpgl --machine mine.toml");
+        // On another arm the same ticks draw something else.
+        assert_eq!(desk.run("verify plan --drawing tiny.hpgl --machine coaxial").code, 1);
+    }
+}
+
+#[test]
+fn plans_of_every_format_are_verified() {
+    let desk = Desk::new();
+    desk.put("other.hpgl", &TINY.replacen("PD200,600", "PD200,640", 1));
+    for machine in PRESETS {
+        for format in ["ticks", "csv", "json"] {
+            desk.good(&format!("convert tiny.hpgl --machine {machine} --format {format} --output plan"));
+            let said = desk.good("verify plan --drawing tiny.hpgl");
+            assert!(said.text().starts_with("certificate holds (tolerance 0.1 mm)\n"), "{}", said.text());
+            let said = desk.good("verify plan --drawing tiny.hpgl --report json");
+            let report: serde_json::Value = serde_json::from_str(said.text()).expect("one JSON object");
+            assert_eq!(report["certificate"]["holds"], true);
+            // A line that is 1 mm longer is not drawn by this plan.
+            let said = desk.run("verify plan --drawing other.hpgl");
+            assert_eq!(said.code, 1, "{machine}, {format}");
+            assert!(said.text().contains("FAILED"), "{}", said.text());
+        }
+    }
+}
+
+#[test]
+fn without_its_drawing_a_plans_motion_is_verified() {
+    let desk = Desk::new();
+    desk.good("convert tiny.hpgl --machine polar --format csv --output plan.csv");
+    let said = desk.good("verify plan.csv");
+    assert!(said.err.starts_with("warning: without --drawing"), "{}", said.err);
+    assert!(said.text().starts_with("motion holds\n"), "{}", said.text());
+    let said = desk.good("verify plan.csv --report json");
+    let report: serde_json::Value = serde_json::from_str(said.text()).expect("one JSON object");
+    assert_eq!(report["certificate"]["after_rounding"], serde_json::Value::Null);
+    let info = desk.good("info plan.csv");
+    assert!(info.text().contains("pens     [1, 2], down 4 times\n"), "{}", info.text());
+}
+
+/// The rows of a CSV plan as numbers.
+fn rows(csv: &str) -> Vec<Vec<i64>> {
+    let numbers = |line: &str| line.split(',').map(|field| field.parse().ok()).collect::<Option<Vec<i64>>>();
+    csv.lines().filter_map(numbers).collect()
+}
+
+/// A CSV plan with one number changed by so much.
+fn tampered(csv: &str, row: usize, column: usize, by: i64) -> String {
+    let mut rows = rows(csv);
+    rows[row][column] += by;
+    let head: Vec<&str> = csv.lines().take_while(|line| !line.starts_with("0,")).collect();
+    let row_text = |row: &Vec<i64>| row.iter().map(i64::to_string).collect::<Vec<_>>().join(",");
+    let body: Vec<String> = rows.iter().map(row_text).collect();
+    format!("{}\n{}\n", head.join("\n"), body.join("\n"))
+}
+
+#[test]
+fn a_plan_that_was_tampered_with_does_not_hold() {
+    let desk = Desk::new();
+    for machine in PRESETS {
+        let plan = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv"));
+        let csv = plan.text();
+        let all = rows(csv);
+        assert_eq!(tampered(csv, 0, 2, 0), csv);
+        let draws = all.iter().position(|row| row[1] == 1).expect("a row with the pen down");
+        let draws =
+            (draws..all.len() - 1).find(|row| all[*row][2..] != all[*row + 1][2..]).expect("it moves");
+        let travels = all.iter().position(|row| row[2..] != all[0][2..]).expect("it moves");
+        for (what, changed) in [
+            ("a tick row, drawing", tampered(csv, draws, 2, 40)),
+            ("a tick row of the other motor", tampered(csv, draws, 3, -40)),
+            ("a tick row, travelling", tampered(csv, travels, 2, 40)),
+            ("the start", tampered(csv, 0, 2, 1)),
+            ("the end", tampered(csv, all.len() - 1, 3, 2)),
+            ("a pen", tampered(csv, draws, 1, 1)),
+            ("a pen that is up", tampered(csv, travels, 1, 1)),
+        ] {
+            desk.put("plan.csv", &changed);
+            let said = desk.run("verify plan.csv --drawing tiny.hpgl");
+            assert_eq!(said.code, 1, "{machine}: {what} was changed\n{}", said.text());
+            assert!(said.text().contains("FAILED: "), "{machine}: {what} was changed\n{}", said.text());
+        }
+    }
+}
+
+#[test]
+fn a_plan_that_was_cut_off_is_no_plan() {
+    let desk = Desk::new();
+    for format in ["ticks", "csv", "json"] {
+        let plan = desk.good(&format!("convert tiny.hpgl --machine corexy --format {format}"));
+        let text = plan.text();
+        let without_last_line = text.trim_end().rfind('\n').map_or(text.len() / 2, |at| at + 1);
+        for end in [without_last_line, text.len() / 2] {
+            desk.put("plan", &text[..end]);
+            let said = desk.run("verify plan --drawing tiny.hpgl");
+            assert_eq!(said.code, 1, "{format} up to byte {end} of {}", text.len());
+            assert!(said.err.contains("plan is not a plan that can be used"), "{}", said.err);
+        }
+    }
+}
+
+#[test]
+fn pictures_of_drawings_and_plans() {
+    let desk = Desk::new();
+    // A picture shows what leaves the reach, too.
+    desk.good("preview large.hpgl --machine hbot --output large.svg");
+    desk.good("convert tiny.hpgl --machine coaxial --output plan.ticks");
+    for source in
+        ["tiny.hpgl", "tiny.hpgl --machine polar --fit", "tiny.hpgl --machine coaxial", "plan.ticks"]
+    {
+        desk.good(&format!("preview {source} --output x.svg"));
+        let svg = desk.text("x.svg");
+        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"), "{source}: {svg}");
+        for part in ["<g id=\"pen1\"", "<g id=\"pen2\"", "id=\"sheet\""] {
+            assert!(svg.contains(part), "{source}: no {part}");
+        }
+        assert_eq!(svg.contains("id=\"start\""), source != "tiny.hpgl", "{source}");
+        desk.good(&format!("preview {source} --output x.PNG"));
+        let png = desk.bytes("x.PNG");
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"), "{source}");
+        let side = |at: usize| u32::from_be_bytes([png[at], png[at + 1], png[at + 2], png[at + 3]]);
+        assert_eq!(side(16).max(side(20)), 1600, "{source}");
+    }
+}
+
+#[test]
+fn checks_and_facts() {
+    let desk = Desk::new();
+    desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;XY1,2;PD400,800,9;PU;LBhello");
+    desk.put("two-pages.hpgl", TWO_PAGES);
+    let said = desk.transcript(&[
+        "check tiny.hpgl",
+        "check tiny.hpgl --machine polar",
+        "check large.hpgl --machine polar",
+        "check large.hpgl --machine polar --fit",
+        "check quirk.hpgl",
+        "check two-pages.hpgl",
+        "info tiny.hpgl",
+        "info two-pages.hpgl",
+    ]);
+    insta::assert_snapshot!(said);
+}
+
+#[test]
+fn only_the_first_page_is_planned() {
+    let desk = Desk::new();
+    desk.put("two-pages.hpgl", TWO_PAGES);
+    let said = desk.good("convert two-pages.hpgl --machine cartesian --format csv");
+    assert!(said.err.contains("two-pages.hpgl has 2 pages; only the first is taken"), "{}", said.err);
+    assert!(rows(said.text()).iter().all(|row| row[1] <= 1));
+}
+
+#[test]
+fn help_for_people_and_shells() {
+    let desk = Desk::new();
+    let said = desk.transcript(&["--help", "convert --help", "machine --help", "explain H0101"]);
+    insta::assert_snapshot!(said);
+    for command in [
+        "check",
+        "info",
+        "verify",
+        "preview",
+        "machine list",
+        "machine show",
+        "machine check",
+        "explain",
+        "man",
+    ] {
+        assert!(desk.good(&format!("{command} --help")).text().contains("Usage: plotplan"), "{command}");
+    }
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let said = desk.good(&format!("completions {shell}"));
+        assert!(said.text().contains("plotplan") && said.text().contains("tolerance"), "{shell}");
+        assert_eq!(said.err, "");
+    }
+    let man = desk.good("man");
+    assert!(man.text().contains(".TH plotplan 1") && man.text().contains("convert"), "{}", man.text());
+    let version = desk.good("--version");
+    assert_eq!(version.text(), concat!("plotplan ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+/// The six numbers of a CSV plan's placement.
+fn placement(csv: &str) -> Vec<f64> {
+    let line = csv.lines().find_map(|line| line.strip_prefix("# placement: ")).expect("a placement");
+    line.split(' ').map(|number| number.parse().expect("a number")).collect()
+}
+
+#[test]
+fn drawings_lie_where_they_are_put() {
+    let desk = Desk::new();
+    let placed = |wish: &str| {
+        placement(desk.good(&format!("convert tiny.hpgl --machine coaxial --format csv {wish}")).text())
+    };
+    // The sheet's lower left corner is at (12.7, 76.2).
+    for (wish, expected) in [
+        ("", [1.0, 0.0, 0.0, 1.0, 12.7, 76.2]),
+        ("--place 1in,25", [1.0, 0.0, 0.0, 1.0, 38.1, 101.2]),
+        ("--place -5mm,2cm", [1.0, 0.0, 0.0, 1.0, 7.7, 96.2]),
+        ("--scale 2", [2.0, 0.0, 0.0, 2.0, 12.7, 76.2]),
+        ("--scale 2 --place 10,10", [2.0, 0.0, 0.0, 2.0, 22.7, 86.2]),
+        // The box of the ink, (5, 10) to (30, 25), is 15 wide and 25 high afterwards; its lower left corner stays.
+        ("--rotate 90", [0.0, 1.0, -1.0, 0.0, 12.7 + 30.0, 76.2 + 5.0]),
+        ("--rotate 90 --scale 2", [0.0, 2.0, -2.0, 0.0, 12.7 + 60.0, 76.2 + 10.0]),
+        ("--rotate 180", [-1.0, 0.0, 0.0, -1.0, 12.7 + 35.0, 76.2 + 35.0]),
+    ] {
+        let found = placed(wish);
+        let near = found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-9);
+        assert!(found.len() == 6 && near, "{wish}: {found:?}, not {expected:?}");
+    }
+    // 25 mm on 215.9 mm: as wide as the sheet, and in the middle of its height.
+    let fit = placed("--fit");
+    let expected = [8.636, 0.0, 0.0, 8.636, 12.7 - 5.0 * 8.636, 76.2 + 279.4 / 2.0 - 17.5 * 8.636];
+    assert!(fit.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.01), "{fit:?}");
+}
+
+/// A plan begins and ends with the pen up, wherever its ink does.
+#[test]
+fn ink_may_begin_and_end_at_the_start_pose() {
+    let desk = Desk::new();
+    desk.put("there.hpgl", "IN;SP1;PU0,0;PD400,0,400,400,0,0;PU;");
+    let said = desk.good("convert there.hpgl --machine cartesian --format csv");
+    let all = rows(said.text());
+    assert_eq!(all[0], [0, 0, 0, 0]);
+    assert_eq!(all[all.len() - 1][1..], [0, 0, 0]);
+    assert!(all.iter().any(|row| row[1] == 1));
+}
+
+#[test]
+fn settings_are_kept() {
+    let desk = Desk::new();
+    let plan =
+        |options: &str| desk.good(&format!("convert tiny.hpgl --machine corexy --format csv {options}"));
+    // Time between rows: the machine's own, or as asked for; longer only where the motors stand still.
+    for (options, period) in [("", 10_000), ("--period 2ms", 2_000), ("--period 250us", 250)] {
+        let said = plan(options);
+        for pair in rows(said.text()).windows(2) {
+            let step = pair[1][0] - pair[0][0];
+            let still = pair[0][2..] == pair[1][2..];
+            assert!(step == period || still && step > period, "{options}: {pair:?}");
+        }
+    }
+    // The file's order: pen 1 first, and its strokes from their first points. Counts are 92.03 a mm of x + y and x - y.
+    let said = plan("--order file");
+    let all = rows(said.text());
+    let downs = all.windows(2).filter(|pair| pair[0][1] == 0 && pair[1][1] != 0).map(|pair| &pair[1]);
+    let points: Vec<(i64, i64, i64)> = downs
+        .map(|row| {
+            let [a, b] = [row[2] as f64 / 92.03, row[3] as f64 / 92.03];
+            (row[1], f64::round(2.0 * (a + b)) as i64, f64::round(2.0 * (a - b)) as i64)
+        })
+        .collect();
+    // Quarters of mm; CI goes from the circle's rightmost point.
+    assert_eq!(points, [(1, 40, 40), (1, 100, 80), (2, 20, 100), (2, 30, 90)]);
+}
+
+/// Plans, whole, at a coarse period. Whatever changes the planner's time law changes them all.
+#[test]
+fn plans_for_every_machine() {
+    let desk = Desk::new();
+    for machine in PRESETS {
+        let said = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv --period 100ms"));
+        let plan = format!("{}\n{}", said.err, said.text());
+        insta::assert_snapshot!(format!("plan_{machine}"), plan);
+    }
+    let said = desk.good("convert tiny.hpgl --machine corexy --period 100ms");
+    insta::assert_snapshot!("plan_corexy_ticks", said.text());
+}
