@@ -141,7 +141,7 @@ impl Window {
         if to < line_end {
             text.push_str("...");
         }
-        let line = bytes[..line_start].iter().filter(|b| **b == b'\n').count() + 1;
+        let line = bytes[..line_start].split(|b| *b == b'\n').count();
         Self { text, marked, line, column: start - line_start + 1 }
     }
 }
@@ -172,7 +172,7 @@ impl Progress {
             Step::Ordering => "ordering strokes".to_owned(),
             Step::Planning => "planning motion".to_owned(),
             Step::Verifying(done, all) => {
-                format!("verifying {} %", if all > 0 { 100 * done / all } else { 100 })
+                format!("verifying {} %", (100 * done).checked_div(all).unwrap_or(100))
             }
         });
     }

@@ -48,7 +48,7 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         });
         match placed {
             Ok(placed) => {
-                text.push_str(&format!("{} can draw it\n", machine.machine.name()));
+                let _ = writeln!(text, "{} can draw it", machine.machine.name());
                 let beyond = placement::beyond_sheet(&machine.machine, &placed);
                 if beyond > 1e-6 {
                     terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));

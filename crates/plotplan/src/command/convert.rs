@@ -1,5 +1,7 @@
 //! `plotplan convert`: a drawing into a plan, or into a clean drawing.
 
+use std::fmt::Write as _;
+
 use annotate_snippets::Level;
 use drawing::Drawing;
 use kinematics::Machine;
@@ -169,5 +171,8 @@ pub(super) fn explain(
 }
 
 fn sha256(bytes: &[u8]) -> String {
-    sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    sha2::Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
