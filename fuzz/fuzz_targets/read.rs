@@ -1,0 +1,17 @@
+//! Any bytes: parse and interpret never panic, and one pass gives what two give.
+#![no_main]
+
+use hpgl::{Options, interpret, parse, read};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let options = Options::default();
+    let reading = read(bytes, &options);
+    assert_eq!(reading, interpret(&parse(bytes, &options), &options));
+    assert!(!reading.pages.is_empty());
+    for stroke in reading.pages.iter().flat_map(|page| &page.drawing.strokes) {
+        assert!(stroke.pen.0 > 0);
+        assert!(stroke.source.end <= bytes.len());
+        assert!(stroke.vertices().iter().all(|point| point.x.is_finite() && point.y.is_finite()));
+    }
+});
