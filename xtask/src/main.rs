@@ -1,2 +1,38 @@
-//! Chores of the repository.
-fn main() {}
+//! Chores of the repository: `cargo xtask tidy`, `cargo xtask corpus DIR`.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "chores talk to whoever runs them")]
+#![expect(clippy::disallowed_methods, reason = "chores look at the clock and at cargo's environment")]
+
+use std::process::ExitCode;
+
+mod corpus;
+mod tidy;
+
+const USAGE: &str = "usage: cargo xtask COMMAND
+
+  tidy          fail when a crate depends on one that it must not know, and on other untidiness
+  corpus DIR    run the release binary over every drawing below DIR: no panic, no hang, no plan without a certificate";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["tidy"] => tidy::run(),
+        ["corpus", folder] => corpus::run(folder.as_ref()),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The repository's top folder.
+fn top() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}

@@ -1,0 +1,244 @@
+//! Every drawing below a folder through the release binary: `check`, and `convert --fit` on two machines.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+
+/// How long one run may take.
+const LIMIT: Duration = Duration::from_secs(10);
+const MACHINES: [&str; 2] = ["coaxial", "polar"];
+const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
+
+/// What came of one run of the binary.
+#[derive(Debug)]
+struct Run {
+    /// Nothing when it had to be stopped.
+    exit: Option<i32>,
+    said: String,
+    /// Whether it left an output file.
+    wrote: bool,
+    seconds: f64,
+}
+
+/// Prints a table and a summary; true if nothing failed.
+pub(crate) fn run(folder: &Path) -> Result<bool> {
+    let mut drawings = Vec::new();
+    find(folder, &mut drawings)?;
+    drawings.sort();
+    anyhow::ensure!(!drawings.is_empty(), "no drawings below {}", folder.display());
+    let binary = build()?;
+    let work = tempfile::tempdir()?;
+    let queue = Mutex::new(drawings.iter().enumerate());
+    let results = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for worker in 0..2 {
+            let (binary, queue, results) = (&binary, &queue, &results);
+            let output = work.path().join(format!("{worker}.csv"));
+            scope.spawn(move || {
+                while let Some((index, drawing)) = next(queue) {
+                    let row = one(binary, folder, drawing, &output);
+                    if let Ok(mut results) = results.lock() {
+                        results.push((index, row));
+                    }
+                }
+            });
+        }
+    });
+    let mut rows = results.into_inner().unwrap_or_default();
+    rows.sort_by_key(|(index, _)| *index);
+    println!("{:<72} {:>8}  check  result on {}", "file", "bytes", MACHINES.join(" / "));
+    let mut failed = 0;
+    for (_, row) in rows {
+        let (text, holds) = row?;
+        println!("{text}");
+        failed += usize::from(!holds);
+    }
+    println!("{} passed, {failed} failed", drawings.len() - failed);
+    Ok(failed == 0)
+}
+
+fn next<T>(queue: &Mutex<impl Iterator<Item = T>>) -> Option<T> {
+    queue.lock().ok()?.next()
+}
+
+fn find(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
+    for entry in std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
+        let path = entry?.path();
+        if path.is_dir() {
+            find(&path, to)?;
+        } else if path
+            .extension()
+            .is_some_and(|e| ENDINGS.contains(&e.to_string_lossy().to_ascii_lowercase().as_str()))
+        {
+            to.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn build() -> Result<PathBuf> {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    let built = Command::new(cargo)
+        .args(["build", "--release", "--quiet", "--package", "plotplan", "--message-format", "json"])
+        .current_dir(crate::top())
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot run cargo")?;
+    anyhow::ensure!(built.status.success(), "the release build failed");
+    // Cargo says where the binary is, whatever the target folder.
+    let executable = String::from_utf8_lossy(&built.stdout)
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter(|message| message["target"]["name"] == "plotplan")
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from));
+    executable.context("cargo did not say where the binary is")
+}
+
+/// One row of the table, and whether all of it is as it should be.
+fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(String, bool)> {
+    let check = start(binary, &["check".as_ref(), drawing.as_os_str()], output)?;
+    let mut faults: Vec<String> = judge_check(&check).into_iter().collect();
+    let mut results = Vec::new();
+    for machine in MACHINES {
+        let arguments: [&std::ffi::OsStr; 11] = [
+            "convert".as_ref(),
+            drawing.as_os_str(),
+            "--machine".as_ref(),
+            machine.as_ref(),
+            "--fit".as_ref(),
+            "--format".as_ref(),
+            "csv".as_ref(),
+            "--report".as_ref(),
+            "json".as_ref(),
+            "-o".as_ref(),
+            output.as_os_str(),
+        ];
+        let run = start(binary, &arguments, output)?;
+        match judge_convert(&run) {
+            Ok(result) => results.push(format!("{result} ({:.1} s)", run.seconds)),
+            Err(fault) => {
+                faults.push(format!("on {machine}: {fault}"));
+                results.push("FAILED".into());
+            }
+        }
+    }
+    let name = drawing.strip_prefix(folder).unwrap_or(drawing).display().to_string();
+    let bytes = std::fs::metadata(drawing)?.len();
+    let exit = check.exit.map_or("-".into(), |exit| exit.to_string());
+    let mut text = format!("{name:<72} {bytes:>8}  {exit:>5}  {}", results.join(" / "));
+    for fault in &faults {
+        let _ = write!(text, "\n    FAILED {fault}");
+    }
+    Ok((text, faults.is_empty()))
+}
+
+/// Runs the binary and stops it after [`LIMIT`].
+fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path) -> Result<Run> {
+    let _ = std::fs::remove_file(output);
+    let said = output.with_extension("stderr");
+    let began = Instant::now();
+    let mut child = Command::new(binary)
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(std::fs::File::create(&said)?)
+        .spawn()
+        .context("cannot start the binary")?;
+    let status = loop {
+        if let Some(status) = child.try_wait()? {
+            break Some(status);
+        }
+        if began.elapsed() > LIMIT {
+            child.kill()?;
+            child.wait()?;
+            break None;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    Ok(Run {
+        // A signal has no code: told apart from every exit code.
+        exit: status.map(|status| status.code().unwrap_or(-1)),
+        said: String::from_utf8_lossy(&std::fs::read(&said)?).into_owned(),
+        wrote: output.exists(),
+        seconds: began.elapsed().as_secs_f64(),
+    })
+}
+
+/// What is wrong with a run whatever it was asked.
+fn broken(run: &Run) -> Option<String> {
+    if run.said.contains("panicked at") {
+        return Some("it panicked".into());
+    }
+    match run.exit {
+        None => Some(format!("not done after {} s", LIMIT.as_secs())),
+        Some(0 | 1) => None,
+        Some(code) => Some(format!("exit {code}")),
+    }
+}
+
+fn judge_check(run: &Run) -> Option<String> {
+    broken(run).map(|fault| format!("check: {fault}"))
+}
+
+/// "planned", or why it was refused; an error where it did neither properly.
+fn judge_convert(run: &Run) -> Result<String, String> {
+    if let Some(fault) = broken(run) {
+        return Err(fault);
+    }
+    if run.exit == Some(1) {
+        if run.wrote {
+            return Err("refused, and yet there is an output file".into());
+        }
+        let reason = run.said.lines().rev().find(|line| line.starts_with("error"));
+        let reason = reason.ok_or("refused without an error that says why")?;
+        return Ok(format!("refused: {}", reason.chars().take(60).collect::<String>()));
+    }
+    let report =
+        run.said.lines().last().and_then(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+    let report = report.ok_or("the last line of standard error is no JSON object")?;
+    match (&report["certificate"]["holds"], run.wrote) {
+        (serde_json::Value::Bool(true), true) => {
+            Ok(format!("planned {:.0} s", report["summary"]["duration_s"].as_f64().unwrap_or(f64::NAN)))
+        }
+        (serde_json::Value::Bool(true), false) => Err("planned, and yet there is no output file".into()),
+        _ => Err("a plan whose certificate does not hold".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(exit: Option<i32>, said: &str, wrote: bool) -> Run {
+        Run { exit, said: said.into(), wrote, seconds: 0.1 }
+    }
+
+    #[test]
+    fn plans_need_a_certificate_that_holds_and_a_file() {
+        let good = "warning: x\n{\"certificate\":{\"holds\":true},\"summary\":{\"duration_s\":12.0}}";
+        assert_eq!(judge_convert(&run(Some(0), good, true)).unwrap(), "planned 12 s");
+        assert!(judge_convert(&run(Some(0), good, false)).is_err());
+        assert!(judge_convert(&run(Some(0), "{\"certificate\":{\"holds\":false}}", true)).is_err());
+        assert!(judge_convert(&run(Some(0), "done", true)).is_err());
+    }
+
+    #[test]
+    fn refusals_need_a_reason_and_no_file() {
+        assert!(judge_convert(&run(Some(1), "error: the drawing has no ink", false)).is_ok());
+        assert!(judge_convert(&run(Some(1), "error: the drawing has no ink", true)).is_err());
+        assert!(judge_convert(&run(Some(1), "", false)).is_err());
+    }
+
+    #[test]
+    fn panics_hangs_and_other_exits_fail() {
+        assert!(judge_check(&run(Some(101), "thread 'main' panicked at x", false)).is_some());
+        assert!(judge_check(&run(None, "", false)).is_some());
+        assert!(judge_check(&run(Some(-1), "", false)).is_some());
+        assert!(judge_check(&run(Some(2), "", false)).is_some());
+        assert!(judge_check(&run(Some(1), "", false)).is_none());
+    }
+}
