@@ -11,6 +11,12 @@ const CELL: f64 = 1.0 / 4.0;
 /// No more cells than this (and one a piece): from there on they grow, and only their middles are looked at.
 const MAX_CELLS: f64 = (1_u32 << 24) as f64;
 
+/// Longer lines are cut into pieces of about this length, mm, so that boxes about slanted ones stay small,
+const LONGEST_PIECE: f64 = 8.0;
+
+/// but into no more pieces than this.
+const MAX_CUTS: f64 = 500_000.0;
+
 /// How many cells of a piece are looked at together.
 pub(crate) const BLOCK: usize = 16;
 
@@ -71,6 +77,10 @@ impl Piece {
     pub(crate) fn bounds(&self) -> Rect {
         Rect::from_points(self.start, self.at(self.length))
     }
+}
+
+fn distance(a: Point, b: Point) -> f64 {
+    libm::hypot(b.x - a.x, b.y - a.y)
 }
 
 /// Whether two boxes have a point in common.
@@ -203,6 +213,7 @@ impl Target {
         let flatness = tolerance_mm * FLATNESS;
         let mut by_pen: Vec<(u16, Vec<Piece>)> =
             drawing.pens().into_iter().filter(|pen| pen.0 != 0).map(|pen| (pen.0, Vec::new())).collect();
+        let longest = LONGEST_PIECE.max(drawing.length() / MAX_CUTS);
         let mut broken = Vec::new();
         for (index, stroke) in drawing.strokes.iter().enumerate() {
             let Ok(slot) = by_pen.binary_search_by_key(&stroke.pen.0, |(pen, _)| *pen) else { continue };
@@ -213,7 +224,11 @@ impl Target {
                 let mut from = segment.start();
                 segment.flatten(flatness, |to| {
                     if to != from {
-                        pieces.push(Piece::new(from, to, error, index));
+                        let cuts = (distance(from, to) / longest).ceil().max(1.0);
+                        let at = |k: f64| if k < cuts { from.lerp(to, k / cuts) } else { to };
+                        for k in 0..cuts as usize {
+                            pieces.push(Piece::new(at(k as f64), at(k as f64 + 1.0), error, index));
+                        }
                     }
                     from = to;
                 });

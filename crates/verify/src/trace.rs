@@ -138,9 +138,10 @@ impl Trace {
         trace
     }
 
-    /// Ink may be off by the tolerance and `floor`: look four times as far as the one and twice as far as the other.
+    /// Ink may be off by the tolerance and `floor`: look a quarter further than that. Where strokes lie close, the work
+    /// grows with the square of this.
     pub(crate) fn widen(&mut self, floor: f64) {
-        let radius = 4.0 * self.tolerance + 2.0 * floor;
+        let radius = 1.25 * (self.tolerance + floor);
         if radius > self.radius {
             self.radius = radius;
             self.near_bounds = None;

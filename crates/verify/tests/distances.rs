@@ -134,11 +134,11 @@ fn compare_both(
     let certificate = certify(machine, drawing, rows);
     let outline = flattened(drawing);
     let before = certificate.before_rounding.expect("every row came with exact positions");
-    compare(&before, &replay(machine, rows, parts), &outline, 4.0 * TOLERANCE)?;
+    compare(&before, &replay(machine, rows, parts), &outline, 1.25 * TOLERANCE)?;
     let rounded: Vec<_> = rows.iter().map(|(pen, ticks)| (*pen, ticks.map(f64::round))).collect();
     let floor = machine.tick_floor(&machine.start());
     let ink = replay(machine, &rounded, parts);
-    compare(&certificate.after_rounding, &ink, &outline, 4.0 * TOLERANCE + 2.0 * floor)?;
+    compare(&certificate.after_rounding, &ink, &outline, 1.25 * (TOLERANCE + floor))?;
     let length: f64 = replay(machine, rows, parts)
         .iter()
         .flat_map(|(_, points)| points.windows(2))
@@ -229,7 +229,7 @@ fn rows_through(machine: &Machine, lines: &Lines) -> Vec<(u16, [f64; 2])> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(160))]
+    #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]
     fn as_brute_force_on_a_cartesian_machine((drawing, lines) in badly_followed()) {
@@ -239,7 +239,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(6))]
 
     #[test]
     fn as_brute_force_on_arms_and_polar_machines((mut drawing, mut lines) in badly_followed(), polar_one: bool) {
