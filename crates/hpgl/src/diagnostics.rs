@@ -161,6 +161,11 @@ impl Findings {
         }
     }
 
+    /// Whether anything of that code was found.
+    pub(crate) fn has(&self, code: Code) -> bool {
+        self.found.iter().any(|diagnostic| diagnostic.code == code)
+    }
+
     /// Makes all findings of one code a single one of another, at their first place.
     pub(crate) fn recode(&mut self, from: Code, to: Code, message: impl FnOnce() -> String) {
         let Some(first) = self.found.iter().position(|diagnostic| diagnostic.code == from) else { return };

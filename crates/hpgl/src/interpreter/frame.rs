@@ -70,6 +70,8 @@ impl AxisMap {
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
     unit_mm: f64,
+    /// The file may choose the plotter.
+    automatic: bool,
     default_points: (Point, Point),
     default_hard_clip: Rect,
     /// The area that the plotter reaches, unrotated plotter units.
@@ -95,6 +97,7 @@ impl Frame {
     pub(crate) fn new(options: &Options) -> Self {
         let mut frame = Self {
             unit_mm: options.plotter_unit_mm,
+            automatic: options.automatic,
             default_points: options.scaling_points,
             default_hard_clip: options.hard_clip,
             hard_clip: options.hard_clip,
@@ -307,8 +310,11 @@ impl Frame {
         self.reset_points();
     }
 
-    /// Takes paper of a plotter: the default P1 and P2, and the area that the pen reaches.
+    /// Takes paper of a plotter, if the file may choose: the default P1 and P2, and the area that the pen reaches.
     pub(crate) fn set_paper(&mut self, paper: &Paper) {
+        if !self.automatic {
+            return;
+        }
         let [x1, y1, x2, y2] = paper.scaling_points;
         let [left, bottom, right, top] = paper.hard_clip;
         self.default_points = (Point::new(x1, y1), Point::new(x2, y2));
@@ -318,8 +324,12 @@ impl Frame {
         }
     }
 
-    /// The default P1 and P2 are the corners of the area that the pen reaches, as in HP-GL/2.
+    /// The default P1 and P2 are the corners of the area that the pen reaches, as in HP-GL/2,
+    /// if the file may choose.
     pub(crate) fn use_corners(&mut self) {
+        if !self.automatic {
+            return;
+        }
         let Rect { x0, y0, x1, y1 } = self.hard_clip;
         self.default_points = (Point::new(x0, y0), Point::new(x1, y1));
         if self.points_assumed {

@@ -82,7 +82,6 @@ pub(crate) struct Interpreter {
     ticks: Ticks,
     characters: Characters,
     pens: Pens,
-    automatic: bool,
     /// Where carriage returns lead, plotter units.
     margin: Point,
     /// Where the last label left the pen: if it is elsewhere, it has moved since.
@@ -123,7 +122,6 @@ impl Interpreter {
             ticks: Ticks::default(),
             characters: Characters::default(),
             pens: Pens::default(),
-            automatic: options.automatic,
             margin: Point::ZERO,
             label_end: None,
             label_buffer: (Vec::new(), 0),
@@ -311,6 +309,9 @@ impl Interpreter {
     /// Ink that was drawn after `SP0` is none, unless there is no other in the whole file: then a pen in the holder is
     /// meant.
     fn settle_ink_of_no_pen(&mut self) {
+        if !self.findings.has(codes::PEN_PUT_AWAY) {
+            return;
+        }
         let strokes = || self.pages.iter().flat_map(|page| &page.drawing.strokes);
         if strokes().all(|stroke| stroke.pen == Pen(0)) {
             if strokes().next().is_some() {

@@ -32,9 +32,7 @@ impl Interpreter {
 
     /// The file is HP-GL/2: P1 and P2 are the corners of the page unless told otherwise.
     pub(super) fn enter_hpgl2(&mut self) {
-        if self.automatic {
-            self.frame.use_corners();
-        }
+        self.frame.use_corners();
     }
 
     /// A reset of the printer, or the end of its job.

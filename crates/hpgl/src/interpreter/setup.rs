@@ -173,11 +173,9 @@ impl Interpreter {
             [] => {}
             [code] if code <= LARGEST_PAPER_CODE => {
                 self.report(codes::PAPER_CODE, || format!("PS{code} is the code of a paper format"));
-                if self.automatic {
-                    self.frame.set_paper(paper_of_code(code));
-                    self.frame_changed();
-                    self.place(self.position);
-                }
+                self.frame.set_paper(paper_of_code(code));
+                self.frame_changed();
+                self.place(self.position);
             }
             [length] => self.set_page(length, None),
             [length, width, ..] if length > LARGEST_PAPER_CODE && width > LARGEST_PAPER_CODE => {
