@@ -8,8 +8,12 @@
 //! the arguments alone, to the last bit: effort is counted in moves, ties go to the lower index, and the only
 //! arithmetic is `+ - * /` and the square root.
 
+mod dedupe;
+mod merge;
 mod report;
+mod seam;
 mod search;
+mod touch;
 
 use drawing::{Drawing, Pen, Point, Stroke};
 
@@ -76,22 +80,35 @@ impl Default for Options {
 /// pieces are drawn with the same pens, each forwards or backwards. The travel, by `cost`, is never dearer than that
 /// of the file's order with the pens put together.
 pub fn optimize(drawing: Drawing, cost: &dyn Cost, options: &Options) -> (Drawing, Report) {
-    let mut report = Report { strokes_before: drawing.strokes.len(), ..Report::default() };
-    (report.travel_cost_before, report.travel_mm_before) = report::travel(&drawing.strokes, cost, options);
-
-    let pens = by_pen(drawing.strokes, options.pen_order.as_deref());
+    let strokes_before = drawing.strokes.len();
+    let (travel_cost_before, travel_mm_before) = report::travel(&drawing.strokes, cost, options);
+    let mut pens = by_pen(drawing.strokes, options.pen_order.as_deref());
+    if options.dedupe {
+        pens = pens.into_iter().map(dedupe::dedupe).collect();
+    }
     let in_file_order: Vec<Stroke> = pens.iter().flatten().cloned().collect();
-    let mut ordered = search_each_pen(pens, cost, options);
+    let strokes_without_duplicates = in_file_order.len();
+    if options.merge {
+        pens = pens.into_iter().map(|strokes| merge::merge(strokes, options.keep_direction)).collect();
+    }
+    let ordered = search_each_pen(pens, cost, options);
+
     let (limit, _) = report::travel(&in_file_order, cost, options);
     let (found, _) = report::travel(&ordered, cost, options);
-    // Not `found > limit`: a cost that is not a number is no reason to reorder anything.
-    if !(found <= limit) {
-        ordered = in_file_order;
-    }
-
-    report.strokes_after = ordered.len();
-    (report.travel_cost_after, report.travel_mm_after) = report::travel(&ordered, cost, options);
-    (Drawing { strokes: ordered }, report)
+    // A cost that is not a number is no reason to reorder anything, and a rounding error none not to.
+    let strokes = if found <= limit + 1e-9 * limit { ordered } else { in_file_order };
+    let (travel_cost_after, travel_mm_after) = report::travel(&strokes, cost, options);
+    let report = Report {
+        strokes_before,
+        strokes_after: strokes.len(),
+        merged: strokes_without_duplicates - strokes.len(),
+        duplicates_removed: strokes_before - strokes_without_duplicates,
+        travel_cost_before,
+        travel_cost_after,
+        travel_mm_before,
+        travel_mm_after,
+    };
+    (Drawing { strokes }, report)
 }
 
 /// The strokes of each pen in the file's order, the pens in the order they are asked for or first seen.
@@ -117,23 +134,42 @@ fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -
     for (at, strokes) in pens.into_iter().enumerate() {
         let start = ordered.last().map_or(options.start, |stroke| Some(stroke.end()));
         let park = if at == last { options.park } else { None };
-        let ends = strokes.iter().map(|stroke| [stroke.start(), stroke.end()]);
-        let problem = Problem::new(ends, start, park, options.keep_direction, cost);
-        let tour = search::solve(&problem, options.effort);
-        ordered.extend(in_order_of(strokes, &tour));
+        let mut strokes = search(strokes, start, park, cost, options, options.effort);
+        // Where closed strokes begin, they are reached elsewhere: another order may be better now.
+        if seam::choose_seams(&mut strokes, start, park, cost) {
+            strokes = search(strokes, start, park, cost, options, options.effort.min(1));
+            seam::choose_seams(&mut strokes, start, park, cost);
+        }
+        ordered.append(&mut strokes);
     }
     ordered
 }
 
+/// Orders the strokes of a pen; closed strokes keep where they begin.
+fn search(
+    strokes: Vec<Stroke>,
+    start: Option<Point>,
+    park: Option<Point>,
+    cost: &dyn Cost,
+    options: &Options,
+    effort: u8,
+) -> Vec<Stroke> {
+    let ends = strokes.iter().map(|stroke| [stroke.start(), stroke.end()]);
+    let problem = Problem::new(ends, start, park, options.keep_direction, cost);
+    let tour = search::solve(&problem, effort);
+    in_order_of(strokes, &tour)
+}
+
 /// The strokes in the order of a tour, which begins with the depot, turned to be entered as it says.
-fn in_order_of(strokes: Vec<Stroke>, tour: &[End]) -> impl Iterator<Item = Stroke> {
+fn in_order_of(strokes: Vec<Stroke>, tour: &[End]) -> Vec<Stroke> {
     let mut strokes: Vec<Option<Stroke>> = strokes.into_iter().map(Some).collect();
-    tour.iter().skip(1).filter_map(move |&entry| {
+    let in_turn = tour.iter().skip(1).filter_map(|&entry| {
         let mut stroke = strokes[entry as usize / 2 - 1].take()?;
         // A closed stroke ends where it begins: there is no reason to turn it.
         if entry % 2 == 1 && !stroke.is_closed() {
             stroke.reverse();
         }
         Some(stroke)
-    })
+    });
+    in_turn.collect()
 }

@@ -186,7 +186,7 @@ impl<'p> Search<'p> {
         for at in self.first[last]..self.first[last + 1] {
             let (cost, next) = self.candidates[at as usize];
             self.work += 1;
-            if !(gain - cost > self.least_gain()) {
+            if gain - cost <= self.least_gain() {
                 break;
             }
             if self.ends[..2 * depth].contains(&next) {

@@ -18,9 +18,6 @@ use random::Random;
 /// How many links of a thousand are glued, cheapest first, for the problems above the strokes themselves.
 const LEVELS: [usize; 4] = [500, 750, 900, 950];
 
-/// Kicks on all strokes and search on all levels follow each other so many times.
-const ROUNDS: u64 = 2;
-
 /// Up to this many strokes, the search is done from every start, and shares the work.
 const SEVERAL_STARTS: usize = 3000;
 
@@ -49,7 +46,7 @@ pub(crate) fn solve(problem: &Problem, effort: u8) -> Vec<End> {
 /// How many candidates may be looked at.
 fn work_of(strokes: usize, effort: u8) -> u64 {
     let n = strokes as u64;
-    let default = 50_000 * n.min(1000) + 8000 * n;
+    let default = 50_000 * n.min(1000) + 4500 * n;
     match effort {
         0 => 0,
         1 => default / 8,
@@ -79,34 +76,29 @@ impl<'p> Best<'p> {
     }
 }
 
-/// Improves a tour on all levels; nine parts of the work in ten are done on the strokes themselves.
+/// Improves a tour, on the strokes themselves with nine parts of the work in ten, then on all levels.
 ///
 /// Gluing what is near (multilevel refinement, Walshaw 2002) is what finds the way from hatch to hatch: the right
 /// partner of an end at the edge of a hatch is never among the nearest, which all are of the same hatch.
 fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
     let mut random = Random::new();
     let mut best = Best::new(problem, tour);
-    for round in 0..ROUNDS {
-        let mut search = Search::new(problem, best.tour.clone());
+    let mut search = Search::new(problem, best.tour.clone());
+    search.descend();
+    search.kick(work / 10 * 9, &mut random);
+    best.offer(search.finish());
+    for glued in LEVELS {
+        let mut level = Contracted::new(problem, best.tour.clone(), glued);
+        let mut search = Search::new(&level.problem, level.problem.file_order());
         search.descend();
-        search.kick(work * 9 / 10 / ROUNDS, &mut random);
-        best.offer(search.finish());
-        for (above, glued) in LEVELS.into_iter().enumerate() {
-            let mut level = Contracted::new(problem, best.tour.clone(), glued);
-            let mut search = Search::new(&level.problem, level.problem.file_order());
-            search.descend();
-            search.kick(work / 20 / ROUNDS / LEVELS.len() as u64, &mut random);
-            let mut tour = search.finish();
-            if above + 1 == LEVELS.len() && !problem.one_way {
-                tour = mirror(&mut level, tour, work / 20 / ROUNDS, &mut random);
-            }
-            let mut tour = level.expand(&tour);
-            orient(problem, &mut tour);
-            best.offer(tour);
+        search.kick(work / 20 / LEVELS.len() as u64, &mut random);
+        let mut tour = search.finish();
+        if glued == LEVELS[LEVELS.len() - 1] && !problem.one_way {
+            tour = mirror(&mut level, tour, work / 20, &mut random);
         }
-        if work == 0 && round == 0 {
-            break;
-        }
+        let mut tour = level.expand(&tour);
+        orient(problem, &mut tour);
+        best.offer(tour);
     }
     let mut search = Search::new(problem, best.tour.clone());
     search.descend();

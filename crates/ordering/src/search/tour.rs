@@ -177,3 +177,70 @@ impl Tour {
         self.entries
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The links of a tour, by end.
+    fn links(entries: &[End]) -> Vec<End> {
+        let mut links = vec![0; 2 * entries.len()];
+        for (at, &entry) in entries.iter().enumerate() {
+            let next = entries[(at + 1) % entries.len()];
+            links[mate(entry) as usize] = next;
+            links[next as usize] = mate(entry);
+        }
+        links
+    }
+
+    /// How many strokes one meets following links from stroke 0.
+    fn circuit(links: &[End]) -> usize {
+        let (mut end, mut count) = (0, 0);
+        loop {
+            end = links[mate(end) as usize];
+            count += 1;
+            if end == 0 {
+                return count;
+            }
+        }
+    }
+
+    proptest! {
+        /// Two stretches of equal length, one turned and one not, once were taken for each other.
+        #[test]
+        fn an_exchange_makes_the_tour_that_its_links_say(
+            order in Just((0..9).collect::<Vec<End>>()).prop_shuffle(),
+            sides in prop::collection::vec(0..2u32, 9),
+            cuts in Just((0..9).collect::<Vec<usize>>()).prop_shuffle(),
+            swapped in prop::collection::vec(any::<bool>(), 3),
+            count in 2..=3usize,
+        ) {
+            let entries: Vec<End> = order.iter().zip(sides).map(|(stroke, side)| 2 * stroke + side).collect();
+            let mut tour = Tour::new(entries.clone());
+            let mut ends: Vec<End> = Vec::new();
+            for (&cut, swapped) in cuts.iter().zip(swapped).take(count) {
+                let [left, right] = tour.link_before(cut);
+                ends.extend(if swapped { [right, left] } else { [left, right] });
+            }
+            let mut expected = links(&entries);
+            for link in 0..count {
+                let (a, b) = (ends[2 * link + 1], ends[(2 * link + 2) % (2 * count)]);
+                expected[a as usize] = b;
+                expected[b as usize] = a;
+            }
+            let plan = tour.reconnect(&ends);
+            prop_assert_eq!(plan.is_some(), circuit(&expected) == entries.len());
+            if let Some(plan) = plan {
+                tour.apply(&plan);
+                prop_assert_eq!(links(&tour.entries), expected.clone());
+                for end in 0..18 {
+                    prop_assert_eq!(tour.link(end), expected[end as usize]);
+                }
+                tour.undo();
+            }
+            prop_assert_eq!(&tour.entries, &entries);
+        }
+    }
+}
