@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// How a plan is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Largest distance between the drawing's ink and the pen's continuous path, both ways, mm.
     pub tolerance: f64,
@@ -21,6 +21,8 @@ pub struct Settings {
     pub period_us: u64,
     /// Where the plan ends, pen up and at rest; the machine's start pose if nothing is said.
     pub park: Option<Joints>,
+    /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
+    pub pen_speeds: Vec<(Pen, f64)>,
 }
 
 /// The largest share of the tolerance that linear motion between rows may use.
@@ -155,7 +157,9 @@ fn check(settings: &Settings) -> Result<(), PlanError> {
         settings.tolerance >= 1e-4 && settings.tolerance.is_finite(),
         "the tolerance must be at least 0.0001 mm",
     )?;
-    setting((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")
+    setting((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")?;
+    let speeds = settings.pen_speeds.iter().all(|(_, speed)| *speed > 0.0 && speed.is_finite());
+    setting(speeds, "a pen's speed must be a positive number of mm/s")
 }
 
 struct Planner<'a, 'b> {
@@ -195,8 +199,9 @@ impl<'a> Planner<'a, '_> {
                 Ok(paths) => {
                     self.travel(pose);
                     self.pen(stroke.pen, self.machine.pen().drop_time, paths.is_empty());
+                    let speed = self.speed_of(stroke.pen);
                     for (path, end) in paths {
-                        self.times.drawing += self.movement(path, end, self.machine.pen().max_speed);
+                        self.times.drawing += self.movement(path, end, speed);
                         self.here = end;
                     }
                     self.pen(Pen(0), self.machine.pen().lift_time, false);
@@ -206,6 +211,12 @@ impl<'a> Planner<'a, '_> {
             }
         }
         first_error.map_or(Ok(()), Err)
+    }
+
+    /// How fast a pen may go over the paper, mm/s.
+    fn speed_of(&self, pen: Pen) -> f64 {
+        let own = self.settings.pen_speeds.iter().filter(|(which, _)| *which == pen).map(|(_, speed)| *speed);
+        own.fold(self.machine.pen().max_speed, f64::min)
     }
 
     /// The stroke's sections as joint paths, each with the pose at its end.

@@ -107,7 +107,7 @@ proptest! {
         period_us in prop_oneof![Just(10_000u64), 500..60_000u64],
     ) {
         let placed = fitted(&machine, &drawing);
-        let settings = Settings { tolerance, period_us, park: None };
+        let settings = Settings { tolerance, period_us, park: None, pen_speeds: Vec::new() };
         let trajectory = plan(&machine, &placed, &settings).unwrap();
         let rows: Vec<ExactRow> = trajectory.rows().collect();
         let period = period_us as f64 * 1e-6;
@@ -166,7 +166,7 @@ proptest! {
 }
 
 fn settings() -> Settings {
-    Settings { tolerance: 0.1, period_us: 10_000, park: None }
+    Settings { tolerance: 0.1, period_us: 10_000, park: None, pen_speeds: Vec::new() }
 }
 
 fn line(points: &[(f64, f64)]) -> Drawing {
@@ -216,6 +216,33 @@ fn a_stroke_that_leaves_the_reach_is_named_with_its_place() {
     let PlanError::OutOfReach { stroke, span, source, .. } = error else { panic!("{error}") };
     assert_eq!((stroke, span.start), (0, 7));
     assert_eq!(source.point, Point::new(0.0, 20.0));
+}
+
+#[test]
+fn a_pen_can_be_slower_than_the_machine() {
+    let machine = machines::corexy();
+    let drawing = line(&[(10.0, 10.0), (110.0, 10.0)]);
+    let slow = Settings { pen_speeds: vec![(Pen(1), 5.0), (Pen(2), 1.0)], ..settings() };
+    let seconds = plan(&machine, &drawing, &slow).unwrap().times().drawing;
+    assert!((20.0..20.2).contains(&seconds), "{seconds}");
+}
+
+/// Found by the property below: rows 42 ms apart cut a corner of 175 degrees by more than the tolerance, because the pen
+/// came off the straight way into it too fast.
+#[test]
+fn a_sharp_corner_at_a_long_period_is_not_cut() {
+    let machine = machines::arm();
+    let drawing = line(&[(0.692, 0.39), (0.175, 0.913), (0.912, 0.372), (0.479, 0.98), (0.0, 0.987)]);
+    let placed = fitted(&machine, &drawing);
+    let settings = Settings { period_us: 42_493, ..settings() };
+    let trajectory = plan(&machine, &placed, &settings).unwrap();
+    let rows: Vec<ExactRow> = trajectory.rows().collect();
+    let drawn =
+        rows.windows(2).filter(|pair| pair[0].row.pen > 0).flat_map(|pair| [pair[0].exact, pair[1].exact]);
+    let ink: Vec<Point> = drawn.map(|exact| machine.pen_at(&Joints::from(exact))).collect();
+    for vertex in placed.strokes[0].vertices() {
+        assert!(to_polyline(*vertex, &ink) <= 0.1, "{vertex} is missed by {}", to_polyline(*vertex, &ink));
+    }
 }
 
 #[test]

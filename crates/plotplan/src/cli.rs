@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use plotplan::{pipeline, quantity};
+use plotplan::quantity;
 
 /// Compiles pen-plotter drawings (HPGL, HP-GL/2) to motor motion.
 ///
@@ -51,14 +51,47 @@ pub(crate) struct Convert {
     /// What to write; `hpgl` and `svg` are the drawing as understood and need no machine
     #[arg(short, long, value_enum, default_value_t = Format::Ticks)]
     pub(crate) format: Format,
+    /// With `--format hpgl`: write encoded polylines (PE) of HP-GL/2
+    #[arg(long)]
+    pub(crate) hpgl2: bool,
     #[command(flatten)]
     pub(crate) planning: Planning,
-    /// Take warnings for errors
-    #[arg(long)]
-    pub(crate) strict: bool,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
     /// How to report on standard error
     #[arg(long, value_enum, default_value_t = ReportForm::Text)]
     pub(crate) report: ReportForm,
+}
+
+/// How a drawing's file is read.
+#[derive(Debug, Args)]
+pub(crate) struct Reading {
+    /// Which page of the file to take, from 1
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) page: usize,
+    /// Plotter that the file was made for (see `plotplan explain plotters`); found out from the file if not given
+    #[arg(long, value_name = "NAME")]
+    pub(crate) plotter: Option<String>,
+    /// Paper of that plotter
+    #[arg(long, value_name = "NAME", requires = "plotter")]
+    pub(crate) paper: Option<String>,
+    /// How to write diagnostics to standard error
+    #[arg(long, value_enum, default_value_t = MessageFormat::Human)]
+    pub(crate) message_format: MessageFormat,
+    /// Take warnings for errors
+    #[arg(long)]
+    pub(crate) strict: bool,
+}
+
+/// How diagnostics are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MessageFormat {
+    /// With a window of the file
+    Human,
+    /// One line each, with file, byte, severity, code and message
+    Short,
+    /// One JSON object a line
+    Json,
 }
 
 /// How a plan is made.
@@ -73,6 +106,21 @@ pub(crate) struct Planning {
     /// In which order to draw the strokes
     #[arg(long, value_enum, default_value_t = Order::Optimize)]
     pub(crate) order: Order,
+    /// How hard to look for an order, from 0 to 3
+    #[arg(long, value_name = "LEVEL", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
+    pub(crate) effort: u8,
+    /// Do not draw what is drawn twice
+    #[arg(long)]
+    pub(crate) dedupe: bool,
+    /// Draw no stroke from its other end
+    #[arg(long)]
+    pub(crate) keep_direction: bool,
+    /// Order of the pens; those not named come after, in the file's order
+    #[arg(long, value_name = "PEN,PEN,...", value_delimiter = ',')]
+    pub(crate) pen_order: Option<Vec<u16>>,
+    /// Whose speed the pen draws at
+    #[arg(long, value_enum, default_value_t = Speed::Machine)]
+    pub(crate) speed: Speed,
     /// Scale and move the drawing to the largest size that sheet and machine allow
     #[arg(long, conflicts_with_all = ["place", "scale"])]
     pub(crate) fit: bool,
@@ -95,10 +143,9 @@ pub(crate) struct Check {
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
     #[command(flatten)]
+    pub(crate) reading: Reading,
+    #[command(flatten)]
     pub(crate) planning: Planning,
-    /// Take warnings for errors
-    #[arg(long)]
-    pub(crate) strict: bool,
 }
 
 #[derive(Debug, Args)]
@@ -108,6 +155,8 @@ pub(crate) struct Info {
     /// For a drawing: also plan it for this machine. For a plan of a machine that is no preset: its file
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
     #[command(flatten)]
     pub(crate) planning: Planning,
 }
@@ -125,6 +174,8 @@ pub(crate) struct Verify {
     /// Largest distance between drawing and pen that the plan was made for; a plan document knows its own
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub(crate) tolerance: Option<f64>,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
     /// How to report
     #[arg(long, value_enum, default_value_t = ReportForm::Text)]
     pub(crate) report: ReportForm,
@@ -140,6 +191,8 @@ pub(crate) struct Preview {
     /// The machine to show it on; a plan knows its own
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
     #[command(flatten)]
     pub(crate) planning: Planning,
 }
@@ -162,7 +215,7 @@ pub(crate) enum Machine {
 
 #[derive(Debug, Args)]
 pub(crate) struct Explain {
-    /// The code, such as H0101
+    /// The code, such as H0101; or `plotters` for the plotters and papers that are known
     pub(crate) code: String,
 }
 
@@ -204,13 +257,13 @@ pub(crate) enum Order {
     File,
 }
 
-impl From<Order> for pipeline::Order {
-    fn from(order: Order) -> Self {
-        match order {
-            Order::Optimize => Self::Optimize,
-            Order::File => Self::File,
-        }
-    }
+/// Whose speed the pen draws at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Speed {
+    /// The machine's
+    Machine,
+    /// The file's (VS) where it gives one, and never more than the machine's
+    File,
 }
 
 fn length(text: &str) -> Result<f64, String> {

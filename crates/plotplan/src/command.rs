@@ -8,12 +8,16 @@ mod motion;
 mod preview;
 mod verify;
 
+use std::fmt::Write as _;
+
 use clap::CommandFactory as _;
+use drawing::Pen;
+use hpgl::{Page, PenSettings};
 use kinematics::Machine;
 use planner::placement::{Size, Wish};
-use plotplan::pipeline::Request;
+use plotplan::pipeline::{Order, Request};
 
-use crate::cli::{Arguments, Command, Planning};
+use crate::cli::{self, Arguments, Command, Planning};
 use crate::failure::Failure;
 use crate::output;
 
@@ -27,6 +31,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Preview(preview) => preview::run(preview),
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
+            if explain.code == "plotters" {
+                return output::write("-", |out| out.write_all(plotters().as_bytes()));
+            }
             let Some(code) = hpgl::Code::from_name(&explain.code) else {
                 let what =
                     format!("there is no code {}; codes stand in brackets in diagnostics", explain.code);
@@ -43,19 +50,47 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// The request that the command line's words make, on this machine.
-fn request(planning: &Planning, machine: &Machine) -> Request {
+/// The request that the command line's words make, for this page on this machine.
+fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
     let size = if planning.fit {
         Size::Fit
     } else {
         let (x, y) = planning.place.unwrap_or((0.0, 0.0));
         Size::Given { scale: planning.scale.unwrap_or(1.0), origin: drawing::Vec2::new(x, y) }
     };
+    let order = match planning.order {
+        cli::Order::File => Order::File,
+        cli::Order::Optimize => Order::Optimize(ordering::Options {
+            effort: planning.effort,
+            dedupe: planning.dedupe,
+            keep_direction: planning.keep_direction,
+            pen_order: planning.pen_order.as_ref().map(|pens| pens.iter().copied().map(Pen).collect()),
+            ..ordering::Options::default()
+        }),
+    };
+    let pen_speeds = match planning.speed {
+        cli::Speed::Machine => Vec::new(),
+        cli::Speed::File => {
+            let of = |(pen, settings): (&Pen, &PenSettings)| settings.speed_mm_s.map(|speed| (*pen, speed));
+            page.pens.iter().filter_map(of).filter(|(_, speed)| *speed > 0.0).collect()
+        }
+    };
     let period = planning.period.unwrap_or(machine.parts().period);
     Request {
         tolerance_mm: planning.tolerance,
         period_us: (period * 1e6).round().max(0.0) as u64,
-        order: planning.order.into(),
+        order,
         wish: Wish { rotate: planning.rotate.unwrap_or(0.0).to_radians(), size },
+        pen_speeds,
     }
+}
+
+/// The plotters and papers that are known, for people.
+fn plotters() -> String {
+    let mut text = String::new();
+    for plotter in hpgl::plotters() {
+        let papers: Vec<&str> = plotter.papers.iter().map(|paper| paper.name).collect();
+        let _ = writeln!(text, "{:<12} {}; papers: {}", plotter.name, plotter.title, papers.join(", "));
+    }
+    text
 }

@@ -4,10 +4,12 @@ use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::Context as _;
+use drawing::Drawing;
 use hpgl::{Reading, Severity};
 use kinematics::Machine;
 use plotplan::machine_file::{MachineFile, PRESETS, nearest};
 
+use crate::cli;
 use crate::failure::Failure;
 use crate::terminal;
 
@@ -37,16 +39,61 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
 /// Why `--strict` refuses.
 pub(crate) const STRICT: &str = "there are warnings, and --strict takes them for errors";
 
-/// Reads a drawing and says what there is to say about it. With `strict` a warning refuses it.
-pub(crate) fn drawing(input: &Input, strict: bool) -> Result<Reading, Failure> {
-    let reading = hpgl::read(&input.bytes, &hpgl::Options::default());
-    terminal::diagnostics(input, &reading.diagnostics);
+/// A drawing's file, read, and the page that was asked for.
+pub(crate) struct Drawn {
+    pub(crate) reading: Reading,
+    page: usize,
+}
+
+impl Drawn {
+    /// The page that was asked for.
+    pub(crate) fn page(&self) -> &hpgl::Page {
+        &self.reading.pages[self.page]
+    }
+
+    /// Its drawing.
+    pub(crate) fn drawing(&self) -> &Drawing {
+        &self.page().drawing
+    }
+}
+
+/// Reads a drawing and says what there is to say about it. With `--strict` a warning refuses it.
+pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<Drawn, Failure> {
+    let options = match &arguments.plotter {
+        None => hpgl::Options::default(),
+        Some(plotter) => hpgl::Options::for_plotter(plotter, arguments.paper.as_deref())
+            .ok_or_else(|| Failure::Usage(unknown_plotter(plotter, arguments.paper.as_deref())))?,
+    };
+    let reading = hpgl::read(&input.bytes, &options);
+    terminal::diagnostics(input, &reading.diagnostics, arguments.message_format);
+    let pages = reading.pages.len();
+    if arguments.page == 0 || arguments.page > pages {
+        let what = format!("{} has {pages} page{}, not page {}", input.name, plural(pages), arguments.page);
+        return Err(Failure::Usage(anyhow::anyhow!(what)));
+    }
     let warned = reading.diagnostics.iter().any(|diagnostic| diagnostic.severity >= Severity::Warning);
-    if strict && warned {
+    if arguments.strict && warned {
         terminal::error(STRICT);
         return Err(Failure::Refused);
     }
-    Ok(reading)
+    Ok(Drawn { reading, page: arguments.page - 1 })
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+fn unknown_plotter(plotter: &str, paper: Option<&str>) -> anyhow::Error {
+    let known = hpgl::plotters().iter().find(|known| known.name == plotter);
+    if let (Some(known), Some(paper)) = (known, paper) {
+        let papers: Vec<&str> = known.papers.iter().map(|paper| paper.name).collect();
+        return anyhow::anyhow!(
+            "the plotter {plotter} has no paper {paper}: there are {}",
+            papers.join(", ")
+        );
+    }
+    let names: Vec<&str> = hpgl::plotters().iter().map(|known| known.name).collect();
+    anyhow::anyhow!("there is no plotter {plotter}: there are {}", names.join(", "))
 }
 
 /// A machine with the file it came from.

@@ -1,6 +1,6 @@
 //! From a drawing to a certified plan: each room's work, one after the other.
 
-use drawing::{Affine, Drawing, Point, Rect};
+use drawing::{Affine, Drawing, Pen, Point, Rect};
 use kinematics::Machine;
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
@@ -8,26 +8,27 @@ use planner::{PlanError, Settings, Trajectory};
 use verify::{Certificate, Verifier};
 
 /// In which order strokes are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Order {
-    /// Reordered, reversed and joined to spend the least time with the pen up.
-    Optimize,
+    /// Reordered, reversed and joined to spend the least time with the pen up, within what the options allow; where the
+    /// plan starts and parks is filled in.
+    Optimize(ordering::Options),
     /// As in the file.
     File,
 }
 
 impl Order {
     /// What the command line calls it.
-    pub fn name(self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
-            Self::Optimize => "optimize",
+            Self::Optimize(_) => "optimize",
             Self::File => "file",
         }
     }
 }
 
 /// What kind of plan is wanted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Request {
     /// Largest distance between the drawing and the pen's continuous path, mm.
     pub tolerance_mm: f64,
@@ -37,6 +38,8 @@ pub struct Request {
     pub order: Order,
     /// Where the drawing goes.
     pub wish: Wish,
+    /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
+    pub pen_speeds: Vec<(Pen, f64)>,
 }
 
 /// A step of the work, for whoever shows progress.
@@ -93,13 +96,12 @@ pub fn compile<'a>(
     planner::check_reach(machine, &placed)?;
     let beyond_sheet_mm = placement::beyond_sheet(machine, &placed);
 
-    let (ordered, ordering) = match request.order {
+    let (ordered, ordering) = match &request.order {
         Order::File => (placed.clone(), None),
-        Order::Optimize => {
+        Order::Optimize(options) => {
             progress(Step::Ordering);
             let start = machine.geometry().forward(&machine.start());
-            let options =
-                ordering::Options { start: Some(start), park: Some(start), ..ordering::Options::default() };
+            let options = ordering::Options { start: Some(start), park: Some(start), ..options.clone() };
             let cost = |a: Point, b: Point| planner::travel_time(machine, a, b);
             let (ordered, report) = ordering::optimize(placed.clone(), &cost, &options);
             (ordered, Some(report))
@@ -108,7 +110,12 @@ pub fn compile<'a>(
     let strokes = ordered.strokes.len();
 
     progress(Step::Planning);
-    let settings = Settings { tolerance: request.tolerance_mm, period_us: request.period_us, park: None };
+    let settings = Settings {
+        tolerance: request.tolerance_mm,
+        period_us: request.period_us,
+        park: None,
+        pen_speeds: request.pen_speeds.clone(),
+    };
     let trajectory = planner::plan(machine, &ordered, &settings)?;
     drop(ordered);
 

@@ -9,6 +9,7 @@ use hpgl::{Diagnostic, Severity};
 use indicatif::{ProgressBar, ProgressStyle};
 use plotplan::pipeline::Step;
 
+use crate::cli::MessageFormat;
 use crate::input::Input;
 
 /// Bytes shown to either side of a place: files of one line of many megabytes are normal.
@@ -40,8 +41,19 @@ fn render(report: &[Group<'_>]) {
 }
 
 /// Prints diagnostics, each with its place in the file.
-pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic]) {
+pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: MessageFormat) {
     for diagnostic in diagnostics {
+        match format {
+            MessageFormat::Human => {}
+            MessageFormat::Short => {
+                say(&format!("{}\n", short(input, diagnostic)));
+                continue;
+            }
+            MessageFormat::Json => {
+                say(&format!("{}\n", object(input, diagnostic)));
+                continue;
+            }
+        }
         let level = match diagnostic.severity {
             Severity::Note => Level::NOTE,
             Severity::Warning => Level::WARNING,
@@ -65,6 +77,29 @@ pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic]) {
             diagnostic.help.as_deref(),
         );
     }
+}
+
+/// A diagnostic in a line that can be searched for.
+fn short(input: &Input, diagnostic: &Diagnostic) -> String {
+    let Diagnostic { code, severity, span, message, count, .. } = diagnostic;
+    let times = if *count > 1 { format!(" ({count} times)") } else { String::new() };
+    format!("{}:{}: {severity}[{code}]: {message}{times}", input.name, span.start)
+}
+
+/// A diagnostic for programs.
+fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
+    serde_json::json!({
+        "file": input.name,
+        "code": diagnostic.code.to_string(),
+        "severity": diagnostic.severity.to_string(),
+        "message": diagnostic.message,
+        "help": diagnostic.help,
+        "count": diagnostic.count,
+        "byte": diagnostic.span.start,
+        "end": diagnostic.span.end,
+        "command": diagnostic.command,
+        "pen_mm": [diagnostic.pen_position.x, diagnostic.pen_position.y],
+    })
 }
 
 /// Prints a message with the window of the file that it is about.

@@ -13,7 +13,8 @@ use crate::{input, output, terminal};
 pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
     let input = input::read(&arguments.file)?;
-    let reading = input::drawing(&input, arguments.strict)?;
+    let drawn = input::drawing(&input, &arguments.reading)?;
+    let reading = &drawn.reading;
     let mut refused = false;
     let mut text = format!("{}: {} commands\n", input.name, reading.summary.commands);
     for (number, page) in reading.pages.iter().enumerate() {
@@ -39,8 +40,8 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         }
     }
     if let Some(machine) = &machine {
-        let drawing = &reading.pages[0].drawing;
-        let request = super::request(&arguments.planning, &machine.machine);
+        let drawing = drawn.drawing();
+        let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
         let placed = placement::place(&machine.machine, drawing, &request.wish).and_then(|map| {
             let mut placed = drawing.clone();
             placed.transform(map);
@@ -52,7 +53,7 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
                 let beyond = placement::beyond_sheet(&machine.machine, &placed);
                 if beyond > 1e-6 {
                     terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));
-                    if arguments.strict {
+                    if arguments.reading.strict {
                         terminal::error(input::STRICT);
                         refused = true;
                     }

@@ -33,42 +33,44 @@ pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
         let what = format!("{} is a plan already; convert takes a drawing", input.name);
         return Err(Failure::Drawing(anyhow::anyhow!(what)));
     }
-    let reading = input::drawing(&input, arguments.strict)?;
-    let drawing = &reading.pages[0].drawing;
-    if reading.pages.len() > 1 {
+    let drawn = input::drawing(&input, &arguments.reading)?;
+    if drawn.reading.pages.len() > 1 {
+        let (page, pages) = (arguments.reading.page, drawn.reading.pages.len());
         terminal::warning(&format!(
-            "{} has {} pages; only the first is taken",
-            input.name,
-            reading.pages.len()
+            "{} has {pages} pages; this is page {page}, --page takes another",
+            input.name
         ));
     }
     match machine {
-        Some(machine) => plan(arguments, &input, drawing, &machine),
-        None => write_drawing(arguments, drawing),
+        Some(machine) => plan(arguments, &input, drawn.page(), &machine),
+        None => write_drawing(arguments, drawn.drawing()),
     }
 }
 
 fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> {
+    let encoding =
+        if arguments.hpgl2 { hpgl::Encoding::Base64 } else { hpgl::EmitOptions::default().encoding };
+    let options = hpgl::EmitOptions { encoding, ..hpgl::EmitOptions::default() };
     output::write(&arguments.output, |out| match arguments.format {
         Format::Svg => formats::svg::write(drawing, out),
-        _ => out.write_all(&hpgl::emit(drawing, &hpgl::EmitOptions::default())),
+        _ => out.write_all(&hpgl::emit(drawing, &options)),
     })
 }
 
 fn plan(
     arguments: &Convert,
     input: &Input,
-    drawing: &Drawing,
+    page: &hpgl::Page,
     machine: &LoadedMachine,
 ) -> Result<(), Failure> {
-    let request = super::request(&arguments.planning, &machine.machine);
-    let compiled = compile(input, drawing, &machine.machine, &request)?;
+    let request = super::request(&arguments.planning, page, &machine.machine);
+    let compiled = compile(input, &page.drawing, &machine.machine, &request)?;
     if compiled.beyond_sheet_mm > 1e-6 {
         terminal::warning(&format!(
             "ink reaches {:.2} mm beyond the sheet (the machine can draw there); --fit keeps it on the sheet",
             compiled.beyond_sheet_mm
         ));
-        if arguments.strict {
+        if arguments.reading.strict {
             terminal::error(input::STRICT);
             return Err(Failure::Refused);
         }

@@ -24,7 +24,8 @@ pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
 
 fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
-    let reading = input::drawing(input, false)?;
+    let drawn = input::drawing(input, &arguments.reading)?;
+    let reading = &drawn.reading;
     let mut text = format!("drawing  {}\n", input.name);
     let _ = writeln!(text, "commands {}", reading.summary.commands);
     for (number, page) in reading.pages.iter().enumerate() {
@@ -56,9 +57,8 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         }
     }
     if let Some(machine) = machine {
-        let request = super::request(&arguments.planning, &machine.machine);
-        let drawing = &reading.pages[0].drawing;
-        let compiled = super::convert::compile(input, drawing, &machine.machine, &request)?;
+        let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
+        let compiled = super::convert::compile(input, drawn.drawing(), &machine.machine, &request)?;
         text.push('\n');
         text.push_str(&report::summary_text(&machine.machine, &compiled));
         text.push_str(&report::certificate_text(&compiled.certificate));

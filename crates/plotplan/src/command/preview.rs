@@ -43,14 +43,15 @@ pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
 
 fn of_drawing(input: &Input, arguments: &Preview) -> Result<Scene, Failure> {
     let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
-    let mut drawing = input::drawing(input, false)?.pages.swap_remove(0).drawing;
+    let drawn = input::drawing(input, &arguments.reading)?;
+    let mut drawing = drawn.drawing().clone();
     let Some(machine) = machine else {
         // No machine: the sheet is what the ink covers.
         let sheet = drawing.bounding_box().unwrap_or(Rect::ZERO);
         return Ok(scene(&input.name, sheet, Vec::new(), &drawing, None));
     };
     let machine = &machine.machine;
-    let request = super::request(&arguments.planning, machine);
+    let request = super::request(&arguments.planning, drawn.page(), machine);
     let map = planner::placement::place(machine, &drawing, &request.wish)
         .map_err(|error| super::convert::explain(input, &drawing, machine, &request, error))?;
     drawing.transform(map);

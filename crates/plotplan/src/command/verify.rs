@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
         None => None,
         Some(file) => {
             let input = input::read(file)?;
-            let mut drawing = input::drawing(&input, false)?.pages.swap_remove(0).drawing;
+            let mut drawing = input::drawing(&input, &arguments.reading)?.drawing().clone();
             drawing.transform(Affine::new(plan.table.header.placement));
             Some(drawing)
         }
