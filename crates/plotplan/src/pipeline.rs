@@ -5,7 +5,7 @@ use kinematics::Machine;
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
 use planner::{PlanError, Settings, Trajectory};
-use verify::{Certificate, Verifier};
+use verify::Certificate;
 
 /// In which order strokes are drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,14 +135,14 @@ pub fn compile<'a>(
         duration_us: trajectory.duration_us(),
     };
     // Against the drawing in the file's order: what ordering lost or changed would show.
-    let mut verifier = Verifier::new(machine, &placed, &header, request.tolerance_mm);
-    for (done, row) in trajectory.rows().enumerate() {
-        if (done as u64).is_multiple_of(PROGRESS_ROWS) {
-            progress(Step::Verifying(done as u64, header.rows));
-        }
-        verifier.row(row.row, Some(row.exact));
-    }
-    let certificate = verifier.finish();
+    let certificate = verify::certify(machine, &placed, &header, request.tolerance_mm, || {
+        trajectory.rows().enumerate().map(|(done, row)| {
+            if (done as u64).is_multiple_of(PROGRESS_ROWS) {
+                progress(Step::Verifying(done as u64, header.rows));
+            }
+            (row.row, Some(row.exact))
+        })
+    });
     Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
 }
 

@@ -23,4 +23,4 @@ mod verifier;
 
 pub use certificate::{Certificate, Deviation, MotorPeak, Spread, TickFloor};
 pub use failure::{Failure, PenMotion, Place, Violation};
-pub use verifier::Verifier;
+pub use verifier::{ExactRow, Verifier, certify};

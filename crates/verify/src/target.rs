@@ -98,28 +98,29 @@ fn distance_to_box(p: Point, bounds: Rect) -> f64 {
 #[derive(Clone, Debug)]
 pub(crate) struct PenTarget {
     pub(crate) pen: u16,
+    /// In the order of the strokes, and within a stroke along it.
     pub(crate) pieces: Vec<Piece>,
-    /// `levels[0][i]` bounds the pieces from `FAN * i` on, `levels[k + 1][i]` the boxes of `levels[k]` likewise; the
-    /// last level is one box.
+    /// Their indices by place, see [`by_place`].
+    order: Vec<u32>,
+    /// `levels[0][i]` bounds the pieces that `order` names from `FAN * i` on, `levels[k + 1][i]` the boxes of
+    /// `levels[k]` likewise; the last level is one box.
     levels: Vec<Vec<Rect>>,
 }
 
 impl PenTarget {
-    fn new(pen: u16, mut pieces: Vec<Piece>) -> Self {
-        sort_by_place(&mut pieces);
+    fn new(pen: u16, pieces: Vec<Piece>) -> Self {
+        let order = by_place(&pieces);
         let mut levels: Vec<Vec<Rect>> = Vec::new();
         let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
-        let leaves: Vec<Rect> = pieces
-            .chunks(FAN)
-            .map(|chunk| union(&chunk.iter().map(Piece::bounds).collect::<Vec<_>>()))
-            .collect();
+        let bounds = |chunk: &[u32]| chunk.iter().map(|i| pieces[*i as usize].bounds()).collect::<Vec<_>>();
+        let leaves: Vec<Rect> = order.chunks(FAN).map(|chunk| union(&bounds(chunk))).collect();
         let mut level = leaves;
         while level.len() > 1 {
             let next = level.chunks(FAN).map(union).collect();
             levels.push(std::mem::replace(&mut level, next));
         }
         levels.push(level);
-        Self { pen, pieces, levels }
+        Self { pen, pieces, order, levels }
     }
 
     /// Calls `to` with the index and the box of every piece whose box meets `bounds`.
@@ -135,10 +136,10 @@ impl PenTarget {
                     children.take_while(|i| *i < self.levels[level - 1].len()).map(|i| (level - 1, i)),
                 );
             } else {
-                for i in children.take_while(|i| *i < self.pieces.len()) {
-                    let piece = self.pieces[i].bounds();
+                for &i in &self.order[children.start..children.end.min(self.order.len())] {
+                    let piece = self.pieces[i as usize].bounds();
                     if meet(piece, bounds) {
-                        to(i as u32, piece);
+                        to(i, piece);
                     }
                 }
             }
@@ -162,10 +163,11 @@ impl PenTarget {
                 // The nearest box is opened first.
                 open[first..].sort_by(|a, b| b.0.total_cmp(&a.0));
             } else {
-                for i in children.take_while(|i| *i < self.pieces.len()) {
-                    let distance = self.pieces[i].distance(self.pieces[i].local(p));
+                for &i in &self.order[children.start..children.end.min(self.order.len())] {
+                    let piece = &self.pieces[i as usize];
+                    let distance = piece.distance(piece.local(p));
                     if distance < best.0 {
-                        best = (distance, i as u32);
+                        best = (distance, i);
                     }
                 }
             }
@@ -174,9 +176,10 @@ impl PenTarget {
     }
 }
 
-/// Sorts pieces along a Morton (Z-order) curve through their middles, so that neighbours share boxes.
-fn sort_by_place(pieces: &mut [Piece]) {
-    let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return };
+/// The pieces' indices along a Morton (Z-order) curve through their middles, so that neighbours share boxes.
+fn by_place(pieces: &[Piece]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
+    let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return order };
     let scale = 65535.0 / all.width().max(all.height()).max(f64::MIN_POSITIVE);
     let spread = |value: f64| {
         let mut bits = u64::from(value as u16);
@@ -185,10 +188,12 @@ fn sort_by_place(pieces: &mut [Piece]) {
         bits = (bits | bits << 2) & 0x3333_3333;
         (bits | bits << 1) & 0x5555_5555
     };
-    pieces.sort_by_cached_key(|piece| {
+    order.sort_by_cached_key(|i| {
+        let piece = &pieces[*i as usize];
         let middle = piece.at(0.5 * piece.length);
         spread((middle.x - all.x0) * scale) | spread((middle.y - all.y0) * scale) << 1
     });
+    order
 }
 
 /// The whole drawing.

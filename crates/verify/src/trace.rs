@@ -11,7 +11,13 @@
 //! convex along a cell, so the cell is covered to within the larger value at its ends; the least over all runs is kept.
 //! A cell that lies beside the joint `v` of two consecutive runs is divided at `m`, the point nearest to `v`: one run
 //! answers for each half.
+//!
+//! **Following.** Where strokes lie so close that hundreds are near, looking at all of them for every run takes too long.
+//! Then only those stretches of strokes are looked at that have been near since the pen came here. Every distance so
+//! found is a bound from above still; what may be lost is that ink covers a stroke in passing. So a table that does not
+//! hold when followed is measured again in full, see [`crate::certify`].
 
+use std::collections::VecDeque;
 use std::ops::Range;
 
 use drawing::{Point, Rect, Vec2};
@@ -33,6 +39,9 @@ const TIGHT: (f64, f64) = (1.0 / 200.0, 1.0 / 16.0);
 const TIGHTEST: f64 = 1.0 / 5000.0;
 /// A run is not halved more often than this.
 const HALVINGS: u32 = 24;
+
+/// So many pieces near a run are enough to follow the nearest.
+const CROWD: usize = 48;
 
 /// Where in the table something happens.
 #[derive(Clone, Copy, Debug)]
@@ -106,6 +115,12 @@ pub(crate) struct Trace {
     near_bounds: Option<Rect>,
     /// How much further than the radius `near_bounds` reaches.
     margin: f64,
+    /// Whether strokes may be followed at all.
+    follows: bool,
+    /// The stretches of strokes that are being followed, as ranges of pieces; none while everything is looked at.
+    followed: Vec<Range<u32>>,
+    /// The latest runs while strokes are followed, with those before them.
+    recent: VecDeque<(Run, Option<Run>)>,
     /// Working memory of [`Near::bound`]: distances of pieces, and which.
     candidates: Vec<(f64, u32)>,
     distances: Histogram,
@@ -115,7 +130,7 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
-    pub(crate) fn new(target: &Target, tolerance: f64, floor: f64) -> Self {
+    pub(crate) fn new(target: &Target, tolerance: f64, floor: f64, follows: bool) -> Self {
         let mut trace = Self {
             tolerance,
             merge: tolerance * MERGE,
@@ -127,6 +142,9 @@ impl Trace {
             near: Vec::new(),
             near_bounds: None,
             margin: tolerance,
+            follows,
+            followed: Vec::new(),
+            recent: VecDeque::new(),
             candidates: Vec::new(),
             distances: Histogram::new(),
             worst: None,
@@ -159,6 +177,8 @@ impl Trace {
             self.pen = pen;
             self.near_bounds = None;
         }
+        self.followed.clear();
+        self.recent.clear();
         self.chain = Some(Chain::new(point, at, None, false));
     }
 
@@ -193,30 +213,28 @@ impl Trace {
     fn measure(&mut self, target: &Target, run: Run, before: Option<Run>) {
         let strokes = &target.pens[self.pen];
         let bounds = Rect::from_points(run.from, run.to).inflate(self.radius, self.radius);
-        self.gather(target, bounds);
+        let following = self.follow(strokes, &run, bounds);
+        if !following {
+            self.gather(target, bounds);
+            self.select(bounds);
+            // What was covered in passing before the strokes at hand were known to be followed.
+            for (run, before) in std::mem::take(&mut self.recent) {
+                self.cover_all(strokes, &run, before.as_ref());
+            }
+        }
+        self.cover_all(strokes, &run, before.as_ref());
 
         let mut nearest = [(f64::INFINITY, 0_u32); 2];
         // The distances of the run's ends from one piece: the one for which the larger is the least.
         let mut common = [f64::INFINITY; 2];
-        self.candidates.clear();
-        for &(index, piece_bounds) in &self.near {
-            if !meet(piece_bounds, bounds) {
-                continue;
-            }
-            self.candidates.push((0.0, index));
-            let piece = &strokes.pieces[index as usize];
-            let local = LocalRun::new(piece, &run);
-            let distances = [piece.distance(local.ends[0]), piece.distance(local.ends[1])];
+        for &(_, index) in &self.candidates {
+            let distances = strokes.pieces[index as usize].distances([run.from, run.to]);
             for (best, distance) in nearest.iter_mut().zip(distances) {
                 if distance < best.0 {
                     *best = (distance, index);
                 }
             }
             common = better(common, distances);
-            self.cover.run(piece, &local, self.radius);
-            if let Some(before) = &before {
-                self.cover.joint(piece, before, &local, self.radius);
-            }
         }
         // Beyond the radius the list may not hold the nearest piece.
         for (best, point) in nearest.iter_mut().zip([run.from, run.to]) {
@@ -224,6 +242,12 @@ impl Trace {
                 *best = strokes.nearest(point);
                 common = better(common, strokes.pieces[best.1 as usize].distances([run.from, run.to]));
             }
+        }
+        if self.follows {
+            if !following && self.candidates.len() > CROWD {
+                self.start_following(strokes, run.to);
+            }
+            self.remember(run, before);
         }
 
         let length = distance(run.from, run.to);
@@ -257,6 +281,93 @@ impl Trace {
                 stroke: strokes.pieces[nearest[end].1 as usize].stroke,
                 pen: strokes.pen,
             });
+        }
+    }
+
+    /// Notes how well a run covers the candidates.
+    fn cover_all(&mut self, strokes: &PenTarget, run: &Run, before: Option<&Run>) {
+        for &(_, index) in &self.candidates {
+            let piece = &strokes.pieces[index as usize];
+            let local = LocalRun::new(piece, run);
+            self.cover.run(piece, &local, self.radius);
+            if let Some(before) = before {
+                self.cover.joint(piece, before, &local, self.radius);
+            }
+        }
+    }
+
+    /// Makes the near pieces that meet `bounds` the candidates.
+    fn select(&mut self, bounds: Rect) {
+        self.candidates.clear();
+        let meeting = self.near.iter().filter(|(_, piece)| meet(*piece, bounds));
+        self.candidates.extend(meeting.map(|(index, _)| (0.0, *index)));
+    }
+
+    /// Makes the followed stretches the candidates, moved on to where the run goes; false if none is near enough to it,
+    /// or none is followed.
+    fn follow(&mut self, strokes: &PenTarget, run: &Run, bounds: Rect) -> bool {
+        if self.followed.is_empty() {
+            return false;
+        }
+        let meets = |index: u32| meet(strokes.pieces[index as usize].bounds(), bounds);
+        let stroke = |index: u32| strokes.pieces[index as usize].stroke;
+        let count = strokes.pieces.len() as u32;
+        self.candidates.clear();
+        let candidates = &mut self.candidates;
+        self.followed.retain_mut(|stretch| {
+            let own = stroke(stretch.start);
+            while stretch.end < count && stroke(stretch.end) == own && meets(stretch.end) {
+                stretch.end += 1;
+            }
+            while stretch.start > 0 && stroke(stretch.start - 1) == own && meets(stretch.start - 1) {
+                stretch.start -= 1;
+            }
+            while stretch.start < stretch.end && !meets(stretch.start) {
+                stretch.start += 1;
+            }
+            while stretch.start < stretch.end && !meets(stretch.end - 1) {
+                stretch.end -= 1;
+            }
+            candidates.extend(stretch.clone().map(|index| (0.0, index)));
+            stretch.start < stretch.end
+        });
+        // Near enough that a plan that holds need not look further.
+        let near = |point: Point| {
+            let mut pieces = self.candidates.iter().map(|(_, index)| &strokes.pieces[*index as usize]);
+            pieces.any(|piece| piece.distance(piece.local(point)) <= 0.75 * self.radius)
+        };
+        if near(run.from) && near(run.to) {
+            return true;
+        }
+        self.followed.clear();
+        false
+    }
+
+    /// From now on follows the stretches of strokes that are near `point`.
+    fn start_following(&mut self, strokes: &PenTarget, point: Point) {
+        let radius = self.radius;
+        let is_near = |index: &u32| {
+            let piece = &strokes.pieces[*index as usize];
+            piece.distance(piece.local(point)) <= radius
+        };
+        let mut near: Vec<u32> = self.candidates.iter().map(|(_, index)| *index).filter(is_near).collect();
+        near.sort_unstable();
+        for index in near {
+            let stroke = strokes.pieces[index as usize].stroke;
+            match self.followed.last_mut() {
+                Some(last) if last.end == index && strokes.pieces[last.start as usize].stroke == stroke => {
+                    last.end += 1;
+                }
+                _ => self.followed.push(index..index + 1),
+            }
+        }
+    }
+
+    /// Keeps the run for as long as the pen may still be near what it was near to then.
+    fn remember(&mut self, run: Run, before: Option<Run>) {
+        self.recent.push_back((run, before));
+        while self.recent.len() > 1 && distance(self.recent[1].0.from, run.to) > 2.0 * self.radius {
+            self.recent.pop_front();
         }
     }
 

@@ -7,7 +7,7 @@ use kinematics::Machine;
 use plotplan::machine_file::MachineFile;
 use plotplan::report;
 use serde_json::{Value, json};
-use verify::{Certificate, Verifier};
+use verify::Certificate;
 
 use super::motion::Motion;
 use crate::cli::{ReportForm, Verify};
@@ -89,9 +89,7 @@ pub(super) fn replay(
         own = Motion::of(&plan.table.rows, machine, OWN_INK * tolerance.max(DEFAULT_TOLERANCE_MM)).drawing();
         &own
     };
-    let mut verifier = Verifier::new(machine, drawing, &plan.table.header, tolerance);
-    for row in &plan.table.rows {
-        verifier.row(*row, None);
-    }
-    verifier.finish()
+    verify::certify(machine, drawing, &plan.table.header, tolerance, || {
+        plan.table.rows.iter().map(|row| (*row, None))
+    })
 }
