@@ -13,6 +13,9 @@ const TINY: &str = "IN;SP1;\nPU400,400;PD1200,400,1200,1000;\nPU800,800;CI200;\n
 /// A line of half a metre.
 const LARGE: &str = "IN;SP1;PU400,400;PD1200,400;PU;PA20000,0;PD;PA400,400;PU;SP0;";
 const TWO_PAGES: &str = "IN;SP1;PU40,40;PD400,40;PU;PG;SP3;PU40,40;PD40,400,800,400;PU;PG;";
+const QUIRKS: &str = "IN;SP1;PU400,400;QQ7;PD800,400;XY1,2;PD400,800,9;PU;LBhello";
+/// Three pens from left to right, the first line twice; the third pen is slow.
+const PENS: &str = "IN;SP1;PU400,400;PD1200,400;PU400,400;PD1200,400;SP2;PU400,800;PD1200,800;SP3;VS2;PU400,1200;PD1200,1200;PU;SP0;";
 const PRESETS: [&str; 5] = ["coaxial", "corexy", "hbot", "polar", "cartesian"];
 
 /// A folder with some files, in which the program runs.
@@ -128,6 +131,12 @@ fn wrong_words_end_with_2() {
         "convert tiny.hpgl --machine coaxial --fit --scale 2",
         "convert tiny.hpgl --machine coaxial --format gcode",
         "convert",
+        "convert tiny.hpgl --machine coaxial --effort 9",
+        "convert tiny.hpgl --machine coaxial --pen-order one",
+        "check tiny.hpgl --page 2",
+        "check tiny.hpgl --plotter hp7475",
+        "check tiny.hpgl --plotter hp7475a --paper a9",
+        "check tiny.hpgl --paper a4",
         "preview tiny.hpgl --output tiny.gif",
         "machine show coxial",
         "explain H9999",
@@ -475,7 +484,7 @@ fn pictures_of_drawings_and_plans() {
 #[test]
 fn checks_and_facts() {
     let desk = Desk::new();
-    desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;XY1,2;PD400,800,9;PU;LBhello");
+    desk.put("quirk.hpgl", QUIRKS);
     desk.put("two-pages.hpgl", TWO_PAGES);
     let said = desk.transcript(&[
         "check tiny.hpgl",
@@ -491,18 +500,52 @@ fn checks_and_facts() {
 }
 
 #[test]
-fn only_the_first_page_is_planned() {
+fn one_page_is_planned_at_a_time() {
     let desk = Desk::new();
     desk.put("two-pages.hpgl", TWO_PAGES);
-    let said = desk.good("convert two-pages.hpgl --machine cartesian --format csv");
-    assert!(said.err.contains("two-pages.hpgl has 2 pages; only the first is taken"), "{}", said.err);
-    assert!(rows(said.text()).iter().all(|row| row[1] <= 1));
+    for (page, pen) in [("", 1), (" --page 1", 1), (" --page 2", 3)] {
+        let said = desk.good(&format!("convert two-pages.hpgl --machine cartesian --format csv{page}"));
+        assert!(said.err.contains("two-pages.hpgl has 2 pages"), "{}", said.err);
+        assert!(rows(said.text()).iter().all(|row| row[1] == 0 || row[1] == pen), "{page}");
+        desk.put("plan.csv", said.text());
+        assert_eq!(desk.run(&format!("verify plan.csv --drawing two-pages.hpgl{page}")).code, 0, "{page}");
+        let other = if pen == 1 { 2 } else { 1 };
+        assert_eq!(desk.run(&format!("verify plan.csv --drawing two-pages.hpgl --page {other}")).code, 1);
+    }
+    for page in [0, 3] {
+        let said = desk.run(&format!("convert two-pages.hpgl --machine cartesian --page {page}"));
+        let expected = format!("error: two-pages.hpgl has 2 pages, not page {page}\n");
+        assert!(said.code == 2 && said.err.ends_with(&expected), "{}", said.err);
+    }
+}
+
+#[test]
+fn diagnostics_for_programs() {
+    let desk = Desk::new();
+    desk.put("quirk.hpgl", QUIRKS);
+    let said = desk
+        .transcript(&["check quirk.hpgl --message-format short", "check quirk.hpgl --message-format json"]);
+    insta::assert_snapshot!(said);
+    let said = desk.good("convert quirk.hpgl --machine cartesian --message-format json --report json");
+    for line in said.err.lines() {
+        serde_json::from_str::<serde_json::Value>(line).expect(line);
+    }
+}
+
+#[test]
+fn drawings_are_written_in_either_language() {
+    let desk = Desk::new();
+    let plain = desk.good("convert tiny.hpgl --format hpgl");
+    desk.good("convert tiny.hpgl --format hpgl --hpgl2 --output encoded.hpgl");
+    assert!(desk.bytes("encoded.hpgl").windows(2).any(|two| two == b"PE"));
+    assert_eq!(desk.good("convert encoded.hpgl --format hpgl").text(), plain.text());
 }
 
 #[test]
 fn help_for_people_and_shells() {
     let desk = Desk::new();
-    let said = desk.transcript(&["--help", "convert --help", "machine --help", "explain H0101"]);
+    let said =
+        desk.transcript(&["--help", "convert --help", "machine --help", "explain H0101", "explain plotters"]);
     insta::assert_snapshot!(said);
     for command in [
         "check",
@@ -588,18 +631,62 @@ fn settings_are_kept() {
             assert!(step == period || still && step > period, "{options}: {pair:?}");
         }
     }
-    // The file's order: pen 1 first, and its strokes from their first points. Counts are 92.03 a mm of x + y and x - y.
+    // The file's order: pen 1 first, and its strokes from their first points.
     let said = plan("--order file");
-    let all = rows(said.text());
-    let downs = all.windows(2).filter(|pair| pair[0][1] == 0 && pair[1][1] != 0).map(|pair| &pair[1]);
-    let points: Vec<(i64, i64, i64)> = downs
-        .map(|row| {
-            let [a, b] = [row[2] as f64 / 92.03, row[3] as f64 / 92.03];
-            (row[1], f64::round(2.0 * (a + b)) as i64, f64::round(2.0 * (a - b)) as i64)
-        })
-        .collect();
-    // Quarters of mm; CI goes from the circle's rightmost point.
-    assert_eq!(points, [(1, 40, 40), (1, 100, 80), (2, 20, 100), (2, 30, 90)]);
+    let downs = pen_downs(said.text());
+    // CI goes from the circle's rightmost point.
+    assert_eq!(downs, [(1, 10.0, 10.0), (1, 25.0, 20.0), (2, 5.0, 25.0), (2, 7.5, 22.5)]);
+}
+
+/// Where each pen goes down, mm to a quarter, in a CSV plan of the CoreXY table: 92.03 counts a mm of x + y and x - y.
+fn pen_downs(csv: &str) -> Vec<(i64, f64, f64)> {
+    let all = rows(csv);
+    let downs = all.windows(2).filter(|pair| pair[0][1] == 0 && pair[1][1] != 0).map(|pair| {
+        let [a, b] = [pair[1][2], pair[1][3]].map(|ticks| ticks as f64 / 92.032);
+        let quarters = |mm: f64| (4.0 * mm).round() / 4.0;
+        (pair[1][1], quarters(0.5 * (a + b)), quarters(0.5 * (a - b)))
+    });
+    downs.collect()
+}
+
+#[test]
+fn strokes_are_drawn_in_the_order_that_was_asked_for() {
+    let desk = Desk::new();
+    desk.put("pens.hpgl", PENS);
+    let run = |options: &str| {
+        let said =
+            desk.good(&format!("convert pens.hpgl --machine corexy --format csv --report json {options}"));
+        let report: serde_json::Value =
+            serde_json::from_str(said.err.lines().last().expect("a line")).expect("one JSON object");
+        let seconds = |what: &str| report["summary"][what].as_f64().expect("a number");
+        (pen_downs(said.text()), [seconds("ink_mm"), seconds("drawing_s"), seconds("travel_mm")])
+    };
+    let in_file = [(1, 10.0, 10.0), (1, 10.0, 10.0), (2, 10.0, 20.0), (3, 10.0, 30.0)];
+    let (file, [ink, drawing, travel]) = run("--order file");
+    assert_eq!(file, in_file);
+    assert!((ink - 80.0).abs() < 0.1, "{ink}");
+    let (kept, _) = run("--keep-direction");
+    assert!(kept.iter().all(|(_, x, _)| *x == 10.0), "no stroke from its other end: {kept:?}");
+    // Every other line from right to left.
+    let (optimized, [all, _, shorter]) = run("");
+    let pens = |downs: &[(i64, f64, f64)]| downs.iter().map(|(pen, ..)| *pen).collect::<Vec<_>>();
+    assert_eq!(pens(&optimized), [1, 2, 3]);
+    assert!(shorter < travel - 30.0, "{shorter} mm of travel, {travel} in the file's order");
+    assert!((all - 80.0).abs() < 0.2, "what is drawn twice is drawn twice: {all} mm");
+    let (deduped, [once, ..]) = run("--dedupe");
+    assert_eq!(pens(&deduped), [1, 2, 3]);
+    assert!((once - 60.0).abs() < 0.1, "{once}");
+    assert_eq!(pens(&run("--pen-order 3,1").0), [3, 1, 2]);
+    // 20 mm at 2 cm/s, the others at the machine's 60 mm/s.
+    let (_, [_, slow, _]) = run("--order file --speed file");
+    assert!((slow - drawing - (20.0 / 20.0 - 20.0 / 60.0)).abs() < 0.15, "{slow} s, {drawing} s");
+    for effort in 0..=3 {
+        let (_, [_, _, travel_mm]) = run(&format!("--effort {effort}"));
+        assert!(
+            travel_mm <= travel,
+            "effort {effort}: {travel_mm} mm of travel, {travel} in the file's order"
+        );
+    }
 }
 
 /// Plans, whole, at a coarse period. Whatever changes the planner's time law changes them all.
