@@ -296,9 +296,13 @@ impl Frame {
         self.turn.inverse() * place
     }
 
-    /// Sets the page: its length along x and, where given, its width along y, from the origin. P1 and P2 become its
-    /// corners.
+    /// Sets the page, from the origin: x runs along its longer side, whichever of the two numbers that is. P1 and P2
+    /// become its corners. A page of one length is a square that is open towards y.
     pub(crate) fn set_page(&mut self, length: f64, width: Option<f64>) {
+        let (length, width) = match width {
+            Some(width) => (length.max(width), Some(length.min(width))),
+            None => (length, None),
+        };
         self.hard_clip = Rect::new(0.0, 0.0, length, width.unwrap_or(length));
         let open = crate::units::SANE_PLU;
         self.page_clip = Some(match width {
