@@ -404,6 +404,9 @@ impl<'a> Parser<'a> {
     /// The rest of a command whose name ends at `at`.
     fn command(&mut self, mnemonic: Mnemonic, form: Form, start: usize) -> Option<Head> {
         self.number += 1;
+        if matches!(&mnemonic.0, b"IN" | b"DF" | b"BP") {
+            self.terminator = self.default_terminator;
+        }
         Some(match form {
             Form::Numbers => return self.numbers(mnemonic, start),
             Form::Label => self.label(mnemonic, start),
