@@ -137,6 +137,7 @@ fn wrong_words_end_with_2() {
         "check tiny.hpgl --plotter hp7475",
         "check tiny.hpgl --plotter hp7475a --paper a9",
         "check tiny.hpgl --paper a4",
+        "verify - --drawing -",
         "preview tiny.hpgl --output tiny.gif",
         "machine show coxial",
         "explain H9999",
@@ -210,6 +211,20 @@ fn a_refused_plan_leaves_an_output_file_as_it_was() {
     assert!(said.out.is_empty(), "the plan is in the file, not on standard output");
     assert!(desk.text("plan.ticks").starts_with("; plotplan: 1\n"));
     assert_eq!(desk.names(), before);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_keeps_standing() {
+    let desk = Desk::new();
+    desk.put("plan.ticks", "");
+    std::os::unix::fs::symlink("plan.ticks", desk.path().join("link")).expect("a link can be made");
+    desk.good("convert tiny.hpgl --machine coaxial --output link");
+    assert!(desk.path().join("link").is_symlink());
+    assert!(desk.text("plan.ticks").starts_with("; plotplan: 1\n"));
+    // A device is written as it is.
+    desk.good("convert tiny.hpgl --machine coaxial --output /dev/null");
+    assert!(!Path::new("/dev/null").is_file());
 }
 
 #[test]

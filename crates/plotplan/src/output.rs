@@ -17,7 +17,9 @@ pub(crate) fn write(
             .and_then(|()| out.flush())
             .map_err(|error| Failure::writing(error, "standard output"));
     }
-    let path = Path::new(to);
+    // A link keeps standing, and what it points to is written.
+    let resolved = std::fs::canonicalize(to);
+    let path = resolved.as_deref().unwrap_or(Path::new(to));
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let failed = |error: std::io::Error| Failure::writing(error, to);
     // A device or a pipe cannot be replaced by another file: it is written as it is.

@@ -19,6 +19,9 @@ use crate::{output, terminal};
 const DEFAULT_TOLERANCE_MM: f64 = 0.1;
 
 pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
+    if arguments.plan == "-" && arguments.drawing.as_deref() == Some("-") {
+        return Err(Failure::Usage(anyhow::anyhow!("plan and drawing cannot both be standard input")));
+    }
     let input = input::read(&arguments.plan)?;
     let (plan, machine) = plan(&input, arguments.machine.as_deref())?;
     let drawing = match &arguments.drawing {
