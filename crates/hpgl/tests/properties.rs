@@ -55,7 +55,7 @@ fn check(bytes: &[u8]) -> hpgl::Reading {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 1500 } else { 20_000 }))]
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 500 } else { 20_000 }))]
 
     #[test]
     fn any_bytes_are_read(bytes in any_file()) {

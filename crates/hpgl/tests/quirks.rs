@@ -200,7 +200,7 @@ fn text_does_not_swallow_the_plot() {
     assert!(!hidden(b"IN;CO \"a;PD9999,9999;\";SP1;PA0,0;PD400,0;PU;SP0;"));
     assert!(!hidden(b"BP1,\"a;PD9999,9999;\";SP1;PA0,0;PD400,0;PU;SP0;"));
     // IN and DF bring the usual terminator back.
-    assert!(!hidden(b"DT#;IN;SP1;PA0,0;LB#1\x03PD400,0;PU;SP0;LBx#"));
+    assert!(!hidden(b"DT#;IN;SP1;PA0,0;LB#1\x03PD400,0;PU;SP0;"));
     assert!(hidden(b"IN;SP1;PA0,0;LBhello;PD400,0;PU;SP0;"));
     assert!(hidden(b"IN;SP1;PA0,0;PD400,0;PU;PA500,500;LBhello"));
     assert!(hidden(b"IN;SP1;PA0,0;LBhello\r\nPD400,0;PU;SP0;"));
