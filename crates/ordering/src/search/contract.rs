@@ -18,7 +18,10 @@ impl<'p> Contracted<'p> {
         let costs: Vec<f64> = tour.windows(2).map(|pair| parent.cost(mate(pair[0]), pair[1])).collect();
         let mut sorted = costs.clone();
         sorted.sort_unstable_by(f64::total_cmp);
-        let limit = sorted.get(sorted.len() * glued / 1000).copied().unwrap_or(0.0);
+        let limit = match sorted.len() * glued / 1000 {
+            0 => f64::NEG_INFINITY,
+            count => sorted[count - 1],
+        };
         let mut begin = vec![0];
         begin.extend((1..tour.len()).filter(|&place| place == 1 || costs[place - 1] > limit));
         begin.push(tour.len());

@@ -1,4 +1,4 @@
-//! Better tours: exchanges of a few links in Lin and Kernighan's manner, and kicks to get out of the next dead end.
+//! Better tours: exchanges of two and three links in Lin and Kernighan's manner, and kicks to get out of the next dead end.
 
 use std::collections::VecDeque;
 
@@ -10,8 +10,8 @@ use super::tour::{MOST_LINKS, Tour};
 /// How many ends, nearest in the plane, an end may be linked to.
 const CANDIDATES: usize = 10;
 
-/// How many candidates are followed at each depth of an exchange: three links change at the most.
-const BREADTH: [usize; MOST_LINKS - 1] = [10, 10];
+/// How many of them are followed to a third link, the most promising first.
+const BREADTH: usize = 8;
 
 /// A kick exchanges two neighbouring stretches of up to so many strokes, one of these bounds or the other. Short ones
 /// do better where there are many strokes for the effort, long ones where there are few.
@@ -171,28 +171,28 @@ impl<'p> Search<'p> {
             self.ends[0] = end;
             self.ends[1] = self.tour.link(end);
             // An exchange puts its ends into the queue, `end` among them.
-            total += self.extend(1, self.link_cost[end as usize]).unwrap_or(0.0);
+            total += self.improve_at().unwrap_or(0.0);
         }
         total
     }
 
-    /// Looks for a link to add at the end of the `depth` links already taken out, whose costs less those of the links
-    /// already added are `gain`; carries out the first exchange that gains, and says how much.
-    fn extend(&mut self, depth: usize, gain: f64) -> Option<f64> {
-        let last = self.ends[2 * depth - 1] as usize;
+    /// Carries out the first exchange found that begins with the link `(ends[0], ends[1])` and gains, of two links or
+    /// of three; says how much it gains.
+    fn improve_at(&mut self) -> Option<f64> {
+        let begin = self.link_cost[self.ends[0] as usize];
         // The most promising first: the gain when the new link is added and the one that must go for it is gone.
         let mut steps = [(0.0, 0, 0); CANDIDATES];
         let mut count = 0;
-        for at in self.first[last]..self.first[last + 1] {
-            let (cost, next) = self.candidates[at as usize];
+        for at in self.candidates_of(self.ends[1]) {
+            let (cost, next) = self.candidates[at];
             self.work += 1;
-            if gain - cost <= self.least_gain() {
+            if begin - cost <= self.least_gain() {
                 break;
             }
-            if self.ends[..2 * depth].contains(&next) {
+            if self.ends[..2].contains(&next) {
                 continue;
             }
-            let step = (gain - cost + self.link_cost[next as usize], next, self.tour.link(next));
+            let step = (begin - cost + self.link_cost[next as usize], next, self.tour.link(next));
             let mut place = count;
             while place > 0 && steps[place - 1].0 < step.0 {
                 steps[place] = steps[place - 1];
@@ -201,21 +201,46 @@ impl<'p> Search<'p> {
             steps[place] = step;
             count += 1;
         }
-        for &(gain, next, other) in &steps[..count.min(BREADTH[depth - 1])] {
-            self.ends[2 * depth] = next;
-            self.ends[2 * depth + 1] = other;
+        for &(gain, next, other) in &steps[..count.min(BREADTH)] {
+            (self.ends[2], self.ends[3]) = (next, other);
             if gain - self.problem.cost(other, self.ends[0]) > self.least_gain()
-                && let Some(gain) = self.exchange(depth + 1)
+                && let Some(gain) = self.exchange(2)
             {
                 return Some(gain);
             }
-            if depth < BREADTH.len()
-                && let Some(gain) = self.extend(depth + 1, gain)
-            {
+            if let Some(gain) = self.improve_with_third(gain) {
                 return Some(gain);
             }
         }
         None
+    }
+
+    /// The same for a third link, when taking out two and adding the one between them gains so much.
+    fn improve_with_third(&mut self, before: f64) -> Option<f64> {
+        for at in self.candidates_of(self.ends[3]) {
+            let (cost, next) = self.candidates[at];
+            self.work += 1;
+            if before - cost <= self.least_gain() {
+                break;
+            }
+            if self.ends[..4].contains(&next) {
+                continue;
+            }
+            let other = self.tour.link(next);
+            let gain = before - cost + self.link_cost[next as usize] - self.problem.cost(other, self.ends[0]);
+            if gain > self.least_gain() {
+                (self.ends[4], self.ends[5]) = (next, other);
+                if let Some(gain) = self.exchange(3) {
+                    return Some(gain);
+                }
+            }
+        }
+        None
+    }
+
+    /// Where the candidates of an end are.
+    fn candidates_of(&self, end: End) -> std::ops::Range<usize> {
+        self.first[end as usize] as usize..self.first[end as usize + 1] as usize
     }
 
     /// Exchanges the first `count` links in `ends`, and says what it gains; nothing if it would not give one tour.

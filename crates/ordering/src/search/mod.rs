@@ -15,8 +15,13 @@ use orient::orient;
 pub(crate) use problem::{End, Problem};
 use random::Random;
 
-/// How many links of a thousand are glued, cheapest first, for the problems above the strokes themselves.
-const LEVELS: [usize; 4] = [500, 750, 900, 950];
+/// The levels of the search: how many links of a thousand are glued, cheapest first, and how many parts of the work
+/// in a thousand are done on what is left. Nothing glued is not nothing done: strokes that are near then have numbers
+/// that are near, and what is looked at together is together in memory.
+const LEVELS: [(usize, u64); 6] = [(0, 900), (500, 13), (750, 13), (900, 12), (950, 12), (0, 0)];
+
+/// The level whose runs are mirrored, and with how many parts of the work in a thousand.
+const MIRRORED: (usize, u64) = (950, 50);
 
 /// Up to this many strokes, the search is done from every start, and shares the work.
 const SEVERAL_STARTS: usize = 3000;
@@ -46,7 +51,7 @@ pub(crate) fn solve(problem: &Problem, effort: u8) -> Vec<End> {
 /// How many candidates may be looked at.
 fn work_of(strokes: usize, effort: u8) -> u64 {
     let n = strokes as u64;
-    let default = 50_000 * n.min(1000) + 4500 * n;
+    let default = 50_000 * n.min(1000) + 2000 * n.min(10_000) + 2500 * n;
     match effort {
         0 => 0,
         1 => default / 8,
@@ -76,33 +81,26 @@ impl<'p> Best<'p> {
     }
 }
 
-/// Improves a tour, on the strokes themselves with nine parts of the work in ten, then on all levels.
+/// Improves a tour on one level after another, most of all on the strokes themselves.
 ///
 /// Gluing what is near (multilevel refinement, Walshaw 2002) is what finds the way from hatch to hatch: the right
 /// partner of an end at the edge of a hatch is never among the nearest, which all are of the same hatch.
 fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
     let mut random = Random::new();
     let mut best = Best::new(problem, tour);
-    let mut search = Search::new(problem, best.tour.clone());
-    search.descend();
-    search.kick(work / 10 * 9, &mut random);
-    best.offer(search.finish());
-    for glued in LEVELS {
+    for (glued, share) in LEVELS {
         let mut level = Contracted::new(problem, best.tour.clone(), glued);
         let mut search = Search::new(&level.problem, level.problem.file_order());
         search.descend();
-        search.kick(work / 20 / LEVELS.len() as u64, &mut random);
+        search.kick(work / 1000 * share, &mut random);
         let mut tour = search.finish();
-        if glued == LEVELS[LEVELS.len() - 1] && !problem.one_way {
-            tour = mirror(&mut level, tour, work / 20, &mut random);
+        if glued == MIRRORED.0 && !problem.one_way {
+            tour = mirror(&mut level, tour, work / 1000 * MIRRORED.1, &mut random);
         }
         let mut tour = level.expand(&tour);
         orient(problem, &mut tour);
         best.offer(tour);
     }
-    let mut search = Search::new(problem, best.tour.clone());
-    search.descend();
-    best.offer(search.finish());
     best.tour
 }
 
