@@ -23,4 +23,4 @@ mod travel;
 pub use error::PlanError;
 pub use lift::JointPath;
 pub use trajectory::{ExactRow, Settings, Times, Trajectory, check_reach, plan};
-pub use travel::travel_time;
+pub use travel::{travel_pose, travel_time};

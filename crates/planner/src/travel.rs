@@ -3,15 +3,19 @@
 use drawing::Point;
 use kinematics::{Joints, Machine};
 
-/// How long it takes to lift the pen at `from`, travel to `to` in joint space and lower it there, s: what ordering
-/// minimises. Symmetric. Infinite where a point is out of reach.
+/// The pose in which the pen is taken to be at a point when travel is compared: that nearest to the start pose. Nothing
+/// where the point is out of reach.
+pub fn travel_pose(machine: &Machine, point: Point) -> Option<Joints> {
+    machine.pose_near(point, &machine.start()).ok()
+}
+
+/// How long it takes to lift the pen in one pose, travel to another in joint space and lower it there, s: what ordering
+/// minimises. Symmetric.
 ///
 /// All motors start and stop together on a trapezoid: with `v` and `a` the smallest of each motor's limit over its way,
 /// the time is `2 / sqrt(a)` when the top speed is not reached (`v² >= a`), else `1 / v + v / a`.
-pub fn travel_time(machine: &Machine, from: Point, to: Point) -> f64 {
-    let pose = |p: Point| machine.pose_near(p, &machine.start());
-    let (Ok(a), Ok(b)) = (pose(from), pose(to)) else { return f64::INFINITY };
-    machine.pen().lift_time + joint_time(machine, &a, &b) + machine.pen().drop_time
+pub fn travel_time(machine: &Machine, from: &Joints, to: &Joints) -> f64 {
+    machine.pen().lift_time + joint_time(machine, from, to) + machine.pen().drop_time
 }
 
 /// The trapezoid's time from pose to pose, s.

@@ -1,7 +1,7 @@
 //! From a drawing to a certified plan: each room's work, one after the other.
 
 use drawing::{Affine, Drawing, Pen, Point, Rect};
-use kinematics::Machine;
+use kinematics::{Joints, Machine};
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
 use planner::{PlanError, Settings, Trajectory};
@@ -76,6 +76,20 @@ pub struct Compiled<'a> {
     pub certificate: Certificate,
 }
 
+/// Travel costs what it takes the motors.
+struct TravelTime<'a>(&'a Machine);
+
+impl ordering::Cost for TravelTime<'_> {
+    fn place(&self, point: Point) -> ordering::Place {
+        let pose = planner::travel_pose(self.0, point).unwrap_or(self.0.start());
+        [pose.x, pose.y]
+    }
+
+    fn between_places(&self, a: ordering::Place, b: ordering::Place) -> f64 {
+        planner::travel_time(self.0, &Joints::from(a), &Joints::from(b))
+    }
+}
+
 /// Rows between two calls that tell of progress.
 const PROGRESS_ROWS: u64 = 100_000;
 
@@ -102,8 +116,7 @@ pub fn compile<'a>(
             progress(Step::Ordering);
             let start = machine.geometry().forward(&machine.start());
             let options = ordering::Options { start: Some(start), park: Some(start), ..options.clone() };
-            let cost = |a: Point, b: Point| planner::travel_time(machine, a, b);
-            let (ordered, report) = ordering::optimize(placed.clone(), &cost, &options);
+            let (ordered, report) = ordering::optimize(placed.clone(), &TravelTime(machine), &options);
             (ordered, Some(report))
         }
     };

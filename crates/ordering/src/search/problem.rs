@@ -2,7 +2,7 @@
 
 use drawing::Point;
 
-use crate::Cost;
+use crate::{Cost, Place};
 
 /// One end of a stroke: stroke `s` has the ends `2s` and `2s + 1`, so that the other end of `e` is `e ^ 1`.
 pub(crate) type End = u32;
@@ -19,6 +19,8 @@ pub(crate) fn mate(end: End) -> End {
 /// to reach. So one search serves paths that are free at both ends, bound to a start, to a park position, or both.
 pub(crate) struct Problem<'a> {
     points: Vec<Point>,
+    /// The points as the cost function sees them.
+    places: Vec<Place>,
     placed: [bool; 2],
     /// Strokes may not be reversed: a move goes from an odd end to an even one, never otherwise.
     pub(crate) one_way: bool,
@@ -36,19 +38,22 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let mut points = vec![park.unwrap_or_default(), start.unwrap_or_default()];
         points.extend(strokes.flatten());
-        Self { points, placed: [park.is_some(), start.is_some()], one_way, cost }
+        let places = points.iter().map(|point| cost.place(*point)).collect();
+        Self { points, places, placed: [park.is_some(), start.is_some()], one_way, cost }
     }
 
     /// Other strokes, the same depot and cost.
     pub(crate) fn with_strokes(&self, strokes: impl Iterator<Item = [Point; 2]>) -> Self {
         let mut points = self.points[..2].to_vec();
         points.extend(strokes.flatten());
-        Self { points, ..*self }
+        let places = points.iter().map(|point| self.cost.place(*point)).collect();
+        Self { points, places, ..*self }
     }
 
     /// Moves a stroke.
     pub(crate) fn place(&mut self, stroke: usize, ends: [Point; 2]) {
         self.points[2 * stroke..2 * stroke + 2].copy_from_slice(&ends);
+        self.places[2 * stroke..2 * stroke + 2].copy_from_slice(&ends.map(|point| self.cost.place(point)));
     }
 
     /// How many strokes there are, the depot included.
@@ -73,7 +78,7 @@ impl<'a> Problem<'a> {
     /// What the pen-up move between two ends costs, in the unit of the cost function.
     pub(crate) fn cost(&self, a: End, b: End) -> f64 {
         if self.is_placed(a) && self.is_placed(b) {
-            self.cost.between(self.point(a), self.point(b))
+            self.cost.between_places(self.places[a as usize], self.places[b as usize])
         } else {
             0.0
         }
