@@ -17,8 +17,9 @@ const BREADTH: usize = 8;
 /// do better where there are many strokes for the effort, long ones where there are few.
 const KICKS: [usize; 2] = [5, 50];
 
-/// A kick that makes the tour dearer by up to this many times the mean link is still accepted at the beginning; the
-/// bound falls to nothing at the end (threshold accepting, Dueck and Scheuer 1990, with a random share of the bound).
+/// A kick that makes the tour dearer is still accepted at the beginning, by up to this many times what the mean link
+/// costs more than the cheapest; the bound falls to nothing at the end (threshold accepting, Dueck and Scheuer 1990,
+/// with a random share of the bound).
 const TOLERANCE: f64 = 2.0;
 
 /// A tour and all that is needed to improve it.
@@ -111,7 +112,9 @@ impl<'p> Search<'p> {
         if n < 4 {
             return;
         }
-        let tolerance = TOLERANCE * self.total / n as f64;
+        // What every move costs alike, a lift and a drop, says nothing about how much moves differ.
+        let cheapest = self.candidates.iter().map(|&(cost, _)| cost).fold(f64::INFINITY, f64::min);
+        let tolerance = TOLERANCE * (self.total / n as f64 - cheapest).max(0.0);
         let begin = self.work;
         while self.work - begin < work {
             // Should nothing else be there to do, kicking itself is.
