@@ -147,7 +147,7 @@ impl Stroke {
 
     /// Length of its ink, mm; 0 for a dot.
     pub fn length(&self) -> f64 {
-        self.segments().map(|segment| segment.length()).sum()
+        self.segments().fold(0.0, |sum, segment| sum + segment.length())
     }
 
     /// The smallest upright rectangle that holds it, mm.
@@ -190,7 +190,7 @@ impl Drawing {
 
     /// Length of all ink, mm.
     pub fn length(&self) -> f64 {
-        self.strokes.iter().map(Stroke::length).sum()
+        self.strokes.iter().fold(0.0, |sum, stroke| sum + stroke.length())
     }
 
     /// Applies an affine map to every stroke.

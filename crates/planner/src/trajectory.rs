@@ -272,6 +272,10 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn pen(&mut self, pen: Pen, dwell: f64, dot: bool) {
+        if self.legs.is_empty() {
+            // The first stroke begins where the plan does: the plan still begins with the pen up.
+            self.legs.push(Leg::Pen { pen: 0, periods: 1 });
+        }
         let period = self.settings.period_us as f64 * 1e-6;
         // A dot is nothing but its dwell: without any there would be no ink in the plan.
         let periods = whole_periods(dwell, period).max(u64::from(dot));

@@ -74,6 +74,18 @@ impl Piece {
         [self.distance(self.local(points[0])), self.distance(self.local(points[1]))]
     }
 
+    /// Whether a line may come within `radius` of the stroke: no if both its ends lie beyond that to one side of the
+    /// piece's line, or both before its start or both behind its end.
+    #[inline]
+    pub(crate) fn may_be_near(&self, from: Point, to: Point, radius: f64) -> bool {
+        let ((x0, y0), (x1, y1)) = (self.local(from), self.local(to));
+        let radius = radius + self.error;
+        y0.min(y1) <= radius
+            && y0.max(y1) >= -radius
+            && x0.min(x1) <= self.length + radius
+            && x0.max(x1) >= -radius
+    }
+
     pub(crate) fn bounds(&self) -> Rect {
         Rect::from_points(self.start, self.at(self.length))
     }

@@ -216,7 +216,7 @@ impl Trace {
         let following = self.follow(strokes, &run, bounds);
         if !following {
             self.gather(target, bounds);
-            self.select(bounds);
+            self.select(strokes, &run, bounds);
             // What was covered in passing before the strokes at hand were known to be followed.
             for (run, before) in std::mem::take(&mut self.recent) {
                 self.cover_all(strokes, &run, before.as_ref());
@@ -296,10 +296,12 @@ impl Trace {
         }
     }
 
-    /// Makes the near pieces that meet `bounds` the candidates.
-    fn select(&mut self, bounds: Rect) {
+    /// Makes the pieces that may be near the run, whose box with the radius around it is `bounds`, the candidates.
+    fn select(&mut self, strokes: &PenTarget, run: &Run, bounds: Rect) {
         self.candidates.clear();
-        let meeting = self.near.iter().filter(|(_, piece)| meet(*piece, bounds));
+        let radius = self.radius;
+        let may_be_near = |index: u32| strokes.pieces[index as usize].may_be_near(run.from, run.to, radius);
+        let meeting = self.near.iter().filter(|(index, piece)| meet(*piece, bounds) && may_be_near(*index));
         self.candidates.extend(meeting.map(|(index, _)| (0.0, *index)));
     }
 
@@ -309,7 +311,11 @@ impl Trace {
         if self.followed.is_empty() {
             return false;
         }
-        let meets = |index: u32| meet(strokes.pieces[index as usize].bounds(), bounds);
+        let radius = self.radius;
+        let meets = |index: u32| {
+            let piece = &strokes.pieces[index as usize];
+            meet(piece.bounds(), bounds) && piece.may_be_near(run.from, run.to, radius)
+        };
         let stroke = |index: u32| strokes.pieces[index as usize].stroke;
         let count = strokes.pieces.len() as u32;
         self.candidates.clear();
@@ -578,7 +584,7 @@ impl Cover {
         let cell = piece.length / f64::from(piece.cells);
         let (first, last) = if piece.length > 0.0 {
             let first = ((low - radius) / cell) as usize;
-            (first / BLOCK, (((high + radius) / cell) as usize + 1).min(count).div_ceil(BLOCK))
+            (first / BLOCK, (((high + radius) / cell) as usize).saturating_add(1).min(count).div_ceil(BLOCK))
         } else {
             (0, 1)
         };

@@ -458,7 +458,7 @@ fn sentences_read_well() {
             "pen 4 draws, and the drawing has no stroke of it, at 3.930000 s, row 327, at 80.00, 30.00 mm",
             "the plan ends at 9730, 7190 ticks instead of parking at 0, 0, at 4.960000 s, row 397, at 97.30, 71.90 mm",
             "29.80 mm of pen 1 in 1 stroke are missed, by more than 0.1338 mm after rounding to ticks where \
-             0.1071 mm are allowed, at 20.00, 27.49 mm, stroke 0 (bytes 0 to 1)",
+             0.1071 mm are allowed, at 20.00, 49.86 mm, stroke 0 (bytes 0 to 1)",
             "45.33 mm of pen 2 in 1 stroke are missed, by more than 0.1338 mm after rounding to ticks where \
              0.1071 mm are allowed, at 80.00, 30.01 mm, stroke 1 (bytes 1 to 2)",
         ]
