@@ -55,9 +55,10 @@ impl Scene {
         pens
     }
 
-    /// The smallest upright rectangle that holds everything, mm, and a margin; points that are not finite aside.
+    /// The smallest upright rectangle that holds sheet, ink, travel and start, mm, and a margin; points that are not finite
+    /// aside. The reach of an arm may go far beyond: what of it lies outside is not shown.
     pub fn bounds(&self) -> Rect {
-        let lines = self.reach.iter().chain(&self.travel).chain(self.ink.iter().map(|ink| &ink.points));
+        let lines = self.travel.iter().chain(self.ink.iter().map(|ink| &ink.points));
         let points = lines.flatten().chain(&self.start).filter(|point| point.is_finite());
         let bounds = points.fold(self.sheet.abs(), |bounds, &point| bounds.union_pt(point));
         let margin = 1.0 + 0.02 * bounds.width().max(bounds.height());
