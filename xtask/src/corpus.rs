@@ -8,8 +8,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
-/// How long one run may take.
+/// How long one run may take,
 const LIMIT: Duration = Duration::from_secs(10);
+
+/// and how much longer for each kilometre of ink beyond the first: such plans take days to draw.
+const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(20);
 const MACHINES: [&str; 2] = ["coaxial", "polar"];
 const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 
@@ -18,7 +21,9 @@ const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 struct Run {
     /// Nothing when it had to be stopped.
     exit: Option<i32>,
+    /// What it wrote to standard error and to standard output.
     said: String,
+    answered: String,
     /// Whether it left an output file.
     wrote: bool,
     seconds: f64,
@@ -100,7 +105,8 @@ fn build() -> Result<PathBuf> {
 
 /// One row of the table, and whether all of it is as it should be.
 fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(String, bool)> {
-    let check = start(binary, &["check".as_ref(), drawing.as_os_str()], output)?;
+    let check = start(binary, &["check".as_ref(), drawing.as_os_str()], output, LIMIT)?;
+    let limit = LIMIT + LIMIT_A_KILOMETRE.mul_f64((kilometres(&check.answered) - 1.0).max(0.0));
     let mut faults: Vec<String> = judge_check(&check).into_iter().collect();
     let mut results = Vec::new();
     for machine in MACHINES {
@@ -117,7 +123,7 @@ fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(S
             "-o".as_ref(),
             output.as_os_str(),
         ];
-        let run = start(binary, &arguments, output)?;
+        let run = start(binary, &arguments, output, limit)?;
         match judge_convert(&run) {
             Ok(result) => results.push(format!("{result} ({:.1} s)", run.seconds)),
             Err(fault) => {
@@ -136,15 +142,22 @@ fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(S
     Ok((text, faults.is_empty()))
 }
 
-/// Runs the binary and stops it after [`LIMIT`].
-fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path) -> Result<Run> {
+/// The ink that `check` tells of, km: "... 6764.26 m of ink ...".
+fn kilometres(answer: &str) -> f64 {
+    let words: Vec<&str> = answer.split_whitespace().collect();
+    let ink = words.windows(4).find(|four| four[1..] == ["m", "of", "ink"]);
+    ink.and_then(|four| four[0].parse::<f64>().ok()).map_or(0.0, |metres| metres / 1000.0)
+}
+
+/// Runs the binary and stops it after `limit`.
+fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Duration) -> Result<Run> {
     let _ = std::fs::remove_file(output);
-    let said = output.with_extension("stderr");
+    let (said, answered) = (output.with_extension("stderr"), output.with_extension("stdout"));
     let began = Instant::now();
     let mut child = Command::new(binary)
         .args(arguments)
         .stdin(Stdio::null())
-        .stdout(Stdio::null())
+        .stdout(std::fs::File::create(&answered)?)
         .stderr(std::fs::File::create(&said)?)
         .spawn()
         .context("cannot start the binary")?;
@@ -152,7 +165,7 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path) -> Result
         if let Some(status) = child.try_wait()? {
             break Some(status);
         }
-        if began.elapsed() > LIMIT {
+        if began.elapsed() > limit {
             child.kill()?;
             child.wait()?;
             break None;
@@ -163,6 +176,7 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path) -> Result
         // A signal has no code: told apart from every exit code.
         exit: status.map(|status| status.code().unwrap_or(-1)),
         said: String::from_utf8_lossy(&std::fs::read(&said)?).into_owned(),
+        answered: String::from_utf8_lossy(&std::fs::read(&answered)?).into_owned(),
         wrote: output.exists(),
         seconds: began.elapsed().as_secs_f64(),
     })
@@ -174,7 +188,7 @@ fn broken(run: &Run) -> Option<String> {
         return Some("it panicked".into());
     }
     match run.exit {
-        None => Some(format!("not done after {} s", LIMIT.as_secs())),
+        None => Some(format!("not done after {:.0} s", run.seconds)),
         Some(0 | 1) => None,
         Some(code) => Some(format!("exit {code}")),
     }
@@ -214,7 +228,7 @@ mod tests {
     use super::*;
 
     fn run(exit: Option<i32>, said: &str, wrote: bool) -> Run {
-        Run { exit, said: said.into(), wrote, seconds: 0.1 }
+        Run { exit, said: said.into(), answered: String::new(), wrote, seconds: 0.1 }
     }
 
     #[test]
@@ -224,6 +238,12 @@ mod tests {
         assert!(judge_convert(&run(Some(0), good, false)).is_err());
         assert!(judge_convert(&run(Some(0), "{\"certificate\":{\"holds\":false}}", true)).is_err());
         assert!(judge_convert(&run(Some(0), "done", true)).is_err());
+    }
+
+    #[test]
+    fn ink_is_read_off_what_check_says() {
+        assert_eq!(kilometres("x: 3 commands\n5 strokes, 6764.26 m of ink from"), 6.764_26);
+        assert_eq!(kilometres("5 strokes, 12.5 mm of ink from"), 0.0);
     }
 
     #[test]
