@@ -57,7 +57,7 @@ impl std::fmt::Display for Fault {
             }
             Self::Singular { dexterity, min } => write!(
                 f,
-                "the arm is too nearly stretched or folded there (dexterity {dexterity:.3}, at least {min:.3} is needed)"
+                "the pose there is too nearly singular: an arm stretched or folded, a rail at its pole (dexterity {dexterity:.3}, at least {min:.3} is needed)"
             ),
         }
     }
@@ -87,14 +87,9 @@ impl Machine {
         let fault = match pose {
             Err(fault) => Some(fault),
             Ok(q) => {
+                let limit = self.joint_fault(&q).and_then(|_| self.poses(p, &self.start()).err());
                 let (dexterity, min) = (self.geometry().dexterity(&q), self.parts().min_dexterity);
-                if dexterity < min {
-                    Some(Fault::Singular { dexterity, min })
-                } else if self.joint_fault(&q).is_some() {
-                    self.poses(p, &self.start()).err()
-                } else {
-                    None
-                }
+                limit.or_else(|| (dexterity < min).then_some(Fault::Singular { dexterity, min }))
             }
         };
         fault.map_or(Ok(()), |fault| Err(OutOfReach { point: p, fault }))

@@ -83,7 +83,8 @@ enum GeometryTable {
     Polar {},
 }
 
-/// Arms are kept away from poses where a joint would turn ten times as fast as it need elsewhere.
+/// Arms are kept away from poses where a joint would turn ten times as fast as it need elsewhere, the polar pen a
+/// millimetre from the pole.
 fn default_min_dexterity() -> f64 {
     0.1
 }
@@ -296,7 +297,8 @@ impl MachineFile {
             (length(&self.sheet.width, "sheet.width")?, length(&self.sheet.height, "sheet.height")?);
         let min_dexterity = match self.geometry {
             GeometryTable::TwoLink { min_dexterity, .. } => min_dexterity,
-            _ => 0.0,
+            GeometryTable::Polar {} => default_min_dexterity(),
+            GeometryTable::Cartesian {} => 0.0,
         };
         Ok(Machine::new(MachineParts {
             name: self.name.clone(),

@@ -34,11 +34,13 @@ pub fn summary(compiled: &Compiled<'_>) -> Value {
         "drawing_s": times.drawing,
         "travel_s": times.travel,
         "lifting_s": times.lifting,
+        "pen_up_share": (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
         "placement": compiled.placement.as_coeffs(),
         "ordering": compiled.ordering.as_ref().map(|report| json!({
             "strokes_before": report.strokes_before,
             "strokes_after": report.strokes_after,
             "merged": report.merged,
+            "duplicates_removed": report.duplicates_removed,
             "travel_mm_before": report.travel_mm_before,
             "travel_mm_after": report.travel_mm_after,
             "travel_s_before": report.travel_cost_before,
@@ -132,9 +134,12 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
     if let Some(report) = &compiled.ordering {
         let _ = writeln!(
             text,
-            "travel {} instead of {} in the file's order",
+            "pen up for {:.1} % of the time: travel {} instead of {} in the file's order, with lifts and drops {} instead of {}",
+            100.0 * (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
             metres(report.travel_mm_after),
-            metres(report.travel_mm_before)
+            metres(report.travel_mm_before),
+            clock(report.travel_cost_after),
+            clock(report.travel_cost_before)
         );
     }
     text

@@ -21,9 +21,10 @@ impl Polar {
         (q.y * frame(q.x).0).to_point()
     }
 
+    /// Every point has a pose; at the pole, which is singular, phi is 0.
+    #[expect(clippy::unnecessary_wraps, reason = "the same shape as the other geometries")]
     pub(super) fn inverse(self, p: Point) -> Result<Joints, Unreachable> {
-        let r = libm::hypot(p.x, p.y);
-        if r > 0.0 { Ok(Joints::new(libm::atan2(p.y, p.x), r)) } else { Err(Unreachable::TooNear(0.0)) }
+        Ok(Joints::new(libm::atan2(p.y, p.x), libm::hypot(p.x, p.y)))
     }
 
     pub(super) fn jacobian(self, q: &Joints) -> Matrix2<f64> {
