@@ -199,5 +199,8 @@ proptest! {
 fn the_example_of_the_specification_is_what_is_written() {
     let specification = include_str!("../../../docs/tick-lines.md");
     let text = String::from_utf8(write(PlanFormat::Ticks, &small())).unwrap();
-    assert!(specification.contains(&format!("```text\n{text}```")), "put this into docs/tick-lines.md:\n{text}");
+    assert!(
+        specification.contains(&format!("```text\n{text}```")),
+        "put this into docs/tick-lines.md:\n{text}"
+    );
 }

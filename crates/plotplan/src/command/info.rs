@@ -27,7 +27,9 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     let drawn = input::drawing(input, &arguments.reading)?;
     let reading = &drawn.reading;
     let mut text = format!("drawing  {}\n", input.name);
+    let used = reading.summary.used.iter().map(|(mnemonic, count)| format!("{mnemonic} {count}"));
     let _ = writeln!(text, "commands {}", reading.summary.commands);
+    let _ = writeln!(text, "used     {}", used.collect::<Vec<_>>().join(", "));
     for (number, page) in reading.pages.iter().enumerate() {
         let drawing = &page.drawing;
         if reading.pages.len() > 1 {
@@ -53,7 +55,15 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         for pen in drawing.pens() {
             let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
             let (count, length) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
-            let _ = writeln!(text, "pen {:<4} {}, {}", pen.0, counted(count, "stroke"), metres(length));
+            let settings = page.pens.get(&pen).copied().unwrap_or_default();
+            let mut own = String::new();
+            if let Some(speed) = settings.speed_mm_s {
+                let _ = write!(own, ", {speed:.0} mm/s");
+            }
+            if let Some(width) = settings.width_mm {
+                let _ = write!(own, ", {width:.2} mm wide");
+            }
+            let _ = writeln!(text, "pen {:<4} {}, {}{own}", pen.0, counted(count, "stroke"), metres(length));
         }
     }
     if let Some(machine) = machine {
