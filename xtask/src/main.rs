@@ -1,22 +1,27 @@
-//! Chores of the repository: `cargo xtask tidy`, `cargo xtask corpus DIR`.
+//! Chores of the repository: `cargo xtask tidy`, `cargo xtask corpus DIR`, `cargo xtask bench plan`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "chores talk to whoever runs them")]
 #![expect(clippy::disallowed_methods, reason = "chores look at the clock and at cargo's environment")]
 
 use std::process::ExitCode;
 
+mod bench;
 mod corpus;
 mod tidy;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   tidy          fail when a crate depends on one that it must not know, and on other untidiness
-  corpus DIR    run the release binary over every drawing below DIR: no panic, no hang, no plan without a certificate";
+  corpus DIR    run the release binary over every drawing below DIR: no panic, no hang, no plan without a certificate
+  bench plan [PYTHON]
+                the planner's workload: duration, limits and speed, beside toppra where PYTHON (python3) has it";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["tidy"] => tidy::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
+        ["bench", "plan"] => bench::plan("python3"),
+        ["bench", "plan", python] => bench::plan(python),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

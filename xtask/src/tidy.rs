@@ -16,7 +16,7 @@ const MAY_KNOW: &[(&str, &[&str])] = &[
     ("verify", &["drawing", "kinematics", "plan"]),
     ("formats", &["drawing", "plan"]),
     ("plotplan", &["drawing", "formats", "hpgl", "kinematics", "ordering", "plan", "planner", "verify"]),
-    ("xtask", &[]),
+    ("xtask", &["drawing", "formats", "hpgl", "kinematics", "plan", "planner"]),
 ];
 
 /// Outside crates that only some may use: the command line's, and formats' serialisation.

@@ -1,0 +1,371 @@
+//! How near the time law is to the best there is, shown from both sides on the same path.
+//!
+//! **From above**, a convex program on a fine grid (Verscheure et al. 2009), solved by an interior-point method: with
+//! b = (ds/dt)² at the grid's nodes and linear between them it minimises `Σ 2 Δs / (√b_i + √b_{i+1})` under the motors'
+//! speed and acceleration at every grid cell's start, middle and end. It is refined until it no longer changes.
+//!
+//! **From below**, what every motion along the path must obey, whatever its grid. The acceleration of motor k is
+//! `(m' √b)' √b`, so `|½ d(m'² b)/ds| <= a |m'|`: between two places the square of a motor's speed changes by no more than
+//! `2 a ∫|m'| ds`, and at each place b is at most what some acceleration allows both motors. The largest b that
+//! obeys this at all nodes comes from sweeps; between nodes a motor cannot be faster than a trapezoid. No time law is
+//! faster than the sum.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettingsBuilder, DefaultSolver, IPSolver as _, NonnegativeConeT, SecondOrderConeT, SolverStatus,
+    SupportedConeT,
+};
+use drawing::{EllipticArc, Pen, Point, Span, Stroke};
+use kinematics::{Joints, Machine};
+use nalgebra::Vector2;
+use planner::JointPath;
+use planner::lift::Course;
+use planner::path::{Budget, Piece, sections};
+use planner::time_law::{SpeedCap, profile};
+use proptest::prelude::*;
+
+mod machines;
+
+/// Corners by 0.05 mm, nothing else: the rows' share of the tolerance is another matter.
+const BUDGET: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.05, row: f64::INFINITY };
+
+/// By how much a profile may take longer than the best, as a share.
+const EXCESS: f64 = 0.20;
+
+/// The path and the motors at one place, from one side.
+#[derive(Clone, Copy)]
+struct Place {
+    ticks: Vector2<f64>,
+    first: Vector2<f64>,
+    second: Vector2<f64>,
+    pen_speed: f64,
+}
+
+/// A cell of the reference's grid.
+struct Cell {
+    length: f64,
+    /// At its start, middle and end.
+    places: [Place; 3],
+    /// ∫|m'| ds over it, ticks.
+    way: Vector2<f64>,
+}
+
+fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut Joints) -> Place {
+    let t = (s * piece.rate).min(1.0);
+    *near = machine.pose_near(piece.curve.eval(t), near).expect("it was lifted");
+    let (velocity, acceleration) = piece.curve.derivatives(t);
+    let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
+    let (first, second) = machine.motor_derivatives(near, velocity, acceleration);
+    Place { ticks: machine.ticks(near), first, second, pen_speed: velocity.hypot2().sqrt() }
+}
+
+/// Every cell of the path in `parts` parts, and none longer than the whole path's length by `50 parts`.
+fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
+    let Course::Drawn(start, section) = &path.course else { unreachable!("strokes are drawn") };
+    let longest = path.cells.iter().map(|cell| cell.length).sum::<f64>() / (50 * parts) as f64;
+    let mut near = *start;
+    let mut grid = Vec::new();
+    for cell in &path.cells {
+        let piece = &section[cell.piece];
+        let count = parts.max((cell.length / longest).ceil() as usize);
+        let length = cell.length / count as f64;
+        for k in 0..count {
+            let from = cell.start + k as f64 * length;
+            let mut at = |share: f64| place(machine, piece, from + share * length, &mut near);
+            let places = [0.0, 0.5, 1.0].map(&mut at);
+            let way = Vector2::from_fn(|motor, _| {
+                let [start, _, end] = places;
+                if start.first[motor] * end.first[motor] >= 0.0 {
+                    return (end.ticks[motor] - start.ticks[motor]).abs();
+                }
+                // It turns back on the way: where?
+                let (mut low, mut high) = (0.0, 1.0);
+                for _ in 0..50 {
+                    let middle = 0.5 * (low + high);
+                    let before = at(middle).first[motor] * start.first[motor] > 0.0;
+                    (low, high) = if before { (middle, high) } else { (low, middle) };
+                }
+                let turn = at(low).ticks[motor];
+                (turn - start.ticks[motor]).abs() + (end.ticks[motor] - turn).abs()
+            });
+            grid.push(Cell { length, places, way });
+        }
+    }
+    grid
+}
+
+/// The largest b at which the motors' and the pen's speeds hold.
+fn by_speed(machine: &Machine, place: &Place, pen: f64) -> f64 {
+    let motors = machine.motors().iter().enumerate();
+    let speeds = motors.map(|(k, motor)| motor.max_speed / place.first[k].abs());
+    let speed = speeds.fold(pen / place.pen_speed, f64::min);
+    speed * speed
+}
+
+/// The largest b at which some u fulfils `|m' u + m'' b| <= a` for both motors.
+fn by_acceleration(machine: &Machine, place: &Place) -> f64 {
+    let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration);
+    let (first, second) = (place.first, place.second);
+    (a * first.y.abs() + b * first.x.abs()) / (first.x * second.y - first.y * second.x).abs()
+}
+
+/// A time that no motion along the path can be faster than, s.
+fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
+    let at_most = |place: &Place| by_speed(machine, place, pen).min(by_acceleration(machine, place));
+    let mut b = vec![0.0; grid.len() + 1];
+    for k in 1..grid.len() {
+        b[k] = at_most(&grid[k - 1].places[2]).min(at_most(&grid[k].places[0]));
+    }
+    let motors = machine.motors();
+    // What b may be at one end of a cell because of what it is at the other.
+    let reached = |cell: &Cell, from: &Place, to: &Place, b: f64| {
+        let by = |k: usize| {
+            let squared_speed =
+                from.first[k] * from.first[k] * b + 2.0 * motors[k].max_acceleration * cell.way[k];
+            squared_speed / (to.first[k] * to.first[k])
+        };
+        by(0).min(by(1))
+    };
+    for _ in 0..4 {
+        for (k, cell) in grid.iter().enumerate() {
+            b[k + 1] = b[k + 1].min(reached(cell, &cell.places[0], &cell.places[2], b[k]));
+        }
+        for (k, cell) in grid.iter().enumerate().rev() {
+            b[k] = b[k].min(reached(cell, &cell.places[2], &cell.places[0], b[k + 1]));
+        }
+    }
+    let time = |(k, cell): (usize, &Cell)| {
+        let by = |motor: usize| {
+            let (v, a) = (motors[motor].max_speed, motors[motor].max_acceleration);
+            let start = cell.places[0].first[motor].abs() * b[k].sqrt();
+            let end = cell.places[2].first[motor].abs() * b[k + 1].sqrt();
+            let way = cell.way[motor];
+            let peak = v.min((0.5 * (start * start + end * end) + a * way).sqrt()).max(start).max(end);
+            let ramps = (2.0 * peak * peak - start * start - end * end) / (2.0 * a);
+            let cruise = if peak > 0.0 { (way - ramps).max(0.0) / peak } else { 0.0 };
+            (2.0 * peak - start - end) / a + cruise
+        };
+        by(0).max(by(1))
+    };
+    grid.iter().enumerate().map(time).sum()
+}
+
+/// The shortest time on the grid, s.
+fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
+    let count = grid.len();
+    let fastest =
+        |cell: &Cell| by_speed(machine, &cell.places[0], pen).min(by_speed(machine, &cell.places[2], pen));
+    // All b as a share of the largest there can be: the solver likes numbers near 1.
+    let unit = grid.iter().map(fastest).fold(0.0, f64::max);
+    // Unknowns: b at the inner nodes, c <= √b there, and d >= 1 / (c + c of the next node) for every cell.
+    let inner = count - 1;
+    let (c0, d0) = (inner, 2 * inner);
+    let mut rows = Rows::default();
+    let b = |node: usize| (1..count).contains(&node).then(|| node - 1);
+    let c = |node: usize| b(node).map(|index| c0 + index);
+    for (k, cell) in grid.iter().enumerate() {
+        for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
+            for (motor, limits) in machine.motors().iter().enumerate() {
+                let place = &cell.places[j];
+                let rate = place.first[motor] / (2.0 * cell.length);
+                let turn = place.second[motor];
+                let scale = unit / limits.max_acceleration;
+                let (from, to) = (scale * ((1.0 - share) * turn - rate), scale * (share * turn + rate));
+                for sign in [1.0, -1.0] {
+                    rows.push(&[(b(k), sign * from), (b(k + 1), sign * to)], 1.0);
+                }
+            }
+        }
+        if k > 0 {
+            let most = fastest(cell).min(by_speed(machine, &grid[k - 1].places[2], pen)) / unit;
+            rows.push(&[(b(k), 1.0)], most);
+            rows.push(&[(b(k), -1.0)], 0.0);
+        }
+    }
+    let linear = rows.count();
+    for node in 1..count {
+        // |(2 c, b - 1)| <= b + 1, which is c² <= b.
+        rows.push(&[(b(node), -1.0)], 1.0);
+        rows.push(&[(c(node), -2.0)], 0.0);
+        rows.push(&[(b(node), -1.0)], -1.0);
+    }
+    for k in 0..count {
+        // |(2, d - e)| <= d + e with e = c + c of the next node, which is d e >= 1.
+        let d = Some(d0 + k);
+        rows.push(&[(d, -1.0), (c(k), -1.0), (c(k + 1), -1.0)], 0.0);
+        rows.push(&[], 2.0);
+        rows.push(&[(d, -1.0), (c(k), 1.0), (c(k + 1), 1.0)], 0.0);
+    }
+    let unknowns = d0 + count;
+    let mut cost = vec![0.0; unknowns];
+    let total: f64 = grid.iter().map(|cell| cell.length).sum();
+    for (k, cell) in grid.iter().enumerate() {
+        cost[d0 + k] = cell.length / total;
+    }
+    let mut cones: Vec<SupportedConeT<f64>> = vec![NonnegativeConeT(linear)];
+    cones.extend(std::iter::repeat_n(SecondOrderConeT(3), inner + count));
+    let (matrix, right) = rows.into_matrix(unknowns);
+    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(500).build().expect("settings");
+    let mut solver =
+        DefaultSolver::new(&CscMatrix::zeros((unknowns, unknowns)), &cost, &matrix, &right, &cones, settings)
+            .expect("a program");
+    solver.solve();
+    let status = solver.solution.status;
+    assert!(matches!(status, SolverStatus::Solved | SolverStatus::AlmostSolved), "{status:?}");
+    // Not the solver's own sum, which trusts its d, but the time that its b take.
+    let speed = |node: usize| b(node).map_or(0.0, |index| (unit * solver.solution.x[index].max(0.0)).sqrt());
+    grid.iter().enumerate().map(|(k, cell)| 2.0 * cell.length / (speed(k) + speed(k + 1))).sum()
+}
+
+/// Rows of `A x + s = right`.
+#[derive(Default)]
+struct Rows {
+    entries: (Vec<usize>, Vec<usize>, Vec<f64>),
+    right: Vec<f64>,
+}
+
+impl Rows {
+    fn push(&mut self, entries: &[(Option<usize>, f64)], right: f64) {
+        for (column, value) in entries {
+            if let Some(column) = column {
+                self.entries.0.push(self.right.len());
+                self.entries.1.push(*column);
+                self.entries.2.push(*value);
+            }
+        }
+        self.right.push(right);
+    }
+
+    fn count(&self) -> usize {
+        self.right.len()
+    }
+
+    fn into_matrix(self, columns: usize) -> (CscMatrix<f64>, Vec<f64>) {
+        let (rows, cols, values) = self.entries;
+        (CscMatrix::new_from_triplets(self.right.len(), columns, rows, cols, values), self.right)
+    }
+}
+
+/// The joint paths of a stroke, one a section.
+fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
+    let mut near = machine.start();
+    let mut paths = Vec::new();
+    for section in sections(stroke, &BUDGET) {
+        let (start, end) = (section[0].curve.start(), section[section.len() - 1].curve.end());
+        let pose = machine.pose_near(start, &near).expect("within reach");
+        paths.push(JointPath::lift(machine, section, pose, 0.1).expect("within reach"));
+        near = machine.pose_near(end, &pose).expect("within reach");
+    }
+    paths
+}
+
+/// Time of our law over all sections, s.
+fn ours(machine: &Machine, paths: &[JointPath], pen: f64) -> f64 {
+    let cap = SpeedCap { pen, row_deviation: f64::INFINITY, period: 0.01 };
+    paths.iter().map(|path| profile(machine, path, &cap).duration).sum()
+}
+
+fn below(machine: &Machine, paths: &[JointPath], pen: f64, parts: usize) -> f64 {
+    paths.iter().map(|path| lower_bound(machine, &grid(machine, path, parts), pen)).sum()
+}
+
+fn polyline(points: &[(f64, f64)]) -> Stroke {
+    let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
+    Stroke::polyline(Pen(1), points, Span::default()).expect("there are points")
+}
+
+/// Three corners, about (60, 90).
+fn corners() -> Stroke {
+    polyline(&[(40.0, 80.0), (75.0, 82.0), (72.0, 104.0), (50.0, 90.0), (45.0, 110.0)])
+}
+
+/// A line that runs into a circle.
+fn line_and_circle() -> Stroke {
+    let mut stroke = polyline(&[(40.0, 80.0), (60.0, 80.0)]);
+    let down = -std::f64::consts::FRAC_PI_2;
+    stroke.arc(EllipticArc::circular(Point::new(60.0, 90.0), 10.0, down, 5.0));
+    stroke
+}
+
+/// A dense wave: short pieces whose blends share them.
+fn wave() -> Stroke {
+    let point = |k: u32| {
+        let x = f64::from(k) * 0.5;
+        (40.0 + x, 90.0 + 6.0 * libm::sin(0.6 * x))
+    };
+    polyline(&(0..60).map(point).collect::<Vec<_>>())
+}
+
+/// Steps back and forth with every corner sharp, as in hatching.
+fn zigzag() -> Stroke {
+    let point = |k: u32| (40.0 + 0.35 * f64::from(k), if k.is_multiple_of(2) { 90.0 } else { 93.0 });
+    polyline(&(0..16).map(point).collect::<Vec<_>>())
+}
+
+#[test]
+fn profiles_are_near_the_best() {
+    type Case = (&'static str, fn() -> Stroke);
+    let shapes: [Case; 4] =
+        [("corners", corners), ("line and circle", line_and_circle), ("wave", wave), ("zigzag", zigzag)];
+    let machines = [("arm", machines::arm()), ("corexy", machines::corexy()), ("polar", machines::polar())];
+    let mut wrong = Vec::new();
+    println!(
+        "{:<8} {:<16} {:>6} {:>9} {:>9} {:>9}  ours/best",
+        "machine", "path", "pen", "below", "best", "ours"
+    );
+    for (name, machine) in &machines {
+        for (shape, stroke) in shapes {
+            for pen in [60.0, 1000.0] {
+                let paths = lifted(machine, &stroke());
+                let program = |parts: usize| -> f64 {
+                    paths.iter().map(|path| convex_program(machine, &grid(machine, path, parts), pen)).sum()
+                };
+                // The error of a grid with one acceleration a cell is proportional to its cells: half of them, half of it.
+                let (mut parts, mut coarse, mut fine) = (4, program(2), program(4));
+                while (coarse - fine).abs() > 1e-3 * fine && parts < 16 {
+                    parts *= 2;
+                    (coarse, fine) = (fine, program(parts));
+                }
+                let best = fine - (coarse - fine);
+                let (ours, below) = (ours(machine, &paths, pen), below(machine, &paths, pen, 64));
+                let excess = ours / best;
+                println!("{name:<8} {shape:<16} {pen:>6} {below:>9.5} {best:>9.5} {ours:>9.5}  {excess:.5}");
+                let case = format!("{name}, {shape}, pen at {pen}: {below} <= {best} <= {ours}");
+                if below > ours * (1.0 + 1e-8) {
+                    wrong.push(format!("impossible: {case}"));
+                }
+                if (below / best - 1.0).abs() > 2e-3 {
+                    wrong.push(format!("the reference is off: {case}"));
+                }
+                if excess > 1.0 + EXCESS {
+                    wrong.push(format!("slow by {excess}: {case}"));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Random polylines: never faster than anything can be, and near to it.
+    #[test]
+    fn profiles_are_near_the_lower_bound(
+        machine in prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())],
+        turns in proptest::collection::vec((-2.5..2.5f64, 0.2..6.0f64), 2..10),
+    ) {
+        let (mut at, mut angle) = (Point::new(55.0, 95.0), 0.0);
+        let mut points = vec![(at.x, at.y)];
+        for (turn, step) in turns {
+            angle += turn;
+            at.x = (at.x + step * libm::cos(angle)).clamp(40.0, 75.0);
+            at.y = (at.y + step * libm::sin(angle)).clamp(78.0, 110.0);
+            points.push((at.x, at.y));
+        }
+        let paths = lifted(&machine, &polyline(&points));
+        let (ours, below) = (ours(&machine, &paths, 1000.0), below(&machine, &paths, 1000.0, 64));
+        prop_assert!(below <= ours * (1.0 + 1e-8), "{} s is less than {} s, which is impossible", ours, below);
+        prop_assert!(ours <= (1.0 + 2.0 * EXCESS) * below, "{} s could perhaps be {} s", ours, below);
+    }
+}

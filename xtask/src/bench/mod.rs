@@ -1,0 +1,62 @@
+//! Benchmarks: figures beside those of peers, by CPU time.
+
+mod plan;
+mod workload;
+
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result};
+
+/// `bench plan`; true if all goals were met. Asked for in a debug build, it starts a release build of itself.
+pub(crate) fn plan(python: &str) -> Result<bool> {
+    if cfg!(debug_assertions) {
+        let mut again = Command::new(env!("CARGO"));
+        again.args(["run", "--quiet", "--release", "--package", "xtask", "--", "bench", "plan", python]);
+        return Ok(again.current_dir(crate::top()).status().context("cargo run --release")?.success());
+    }
+    plan::run(python)
+}
+
+/// What `work` gives, and the CPU time that it takes, s: the least of three rounds, because other programs on this
+/// computer should not count, each of as many runs as the clock needs to see them.
+fn fastest<T>(mut work: impl FnMut() -> T) -> (T, f64) {
+    const ROUND: f64 = 0.3;
+    let mut result = work();
+    let mut least = f64::INFINITY;
+    for _ in 0..3 {
+        let clock = Clock::start();
+        let mut runs = 0.0;
+        while runs == 0.0 || clock.seconds() < ROUND {
+            result = work();
+            runs += 1.0;
+        }
+        least = least.min(clock.seconds() / runs);
+    }
+    (result, least)
+}
+
+/// CPU time of this thread where the system tells it, otherwise time.
+struct Clock {
+    cpu: Option<f64>,
+    wall: Instant,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self { cpu: Self::cpu(), wall: Instant::now() }
+    }
+
+    fn seconds(&self) -> f64 {
+        match (self.cpu, Self::cpu()) {
+            (Some(before), Some(now)) => now - before,
+            _ => self.wall.elapsed().as_secs_f64(),
+        }
+    }
+
+    /// Linux: nanoseconds on a CPU.
+    fn cpu() -> Option<f64> {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        Some(text.split(' ').next()?.parse::<f64>().ok()? * 1e-9)
+    }
+}

@@ -1,0 +1,396 @@
+//! `cargo xtask bench plan`: how long the planner's workload takes to draw, whether the motors stay inside their limits,
+//! and how fast all of it is computed; toppra (Pham & Pham) beside it where it is installed.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context as _, Result};
+use drawing::{Drawing, Point, Rect, Segment};
+use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, TwoLink};
+use planner::lift::Course;
+use planner::path::{Budget, sections};
+use planner::placement::{Size, Wish, place};
+use planner::time_law::{Profile, SpeedCap, profile};
+use planner::{JointPath, Settings, Trajectory};
+
+use super::{fastest, workload};
+
+/// The workload's points, and ten times as many for how cost grows.
+const POINTS: usize = 10_000;
+const TOLERANCE: f64 = 0.05;
+/// Time between the rows in which accelerations are looked at, microseconds.
+const PERIOD_US: u64 = 1000;
+
+/// Largest speed and acceleration of the belts, mm/s and mm/s²: the box that holds the disc of 100 mm/s and 1000 mm/s².
+const SPEED: f64 = 141.42;
+const ACCELERATION: f64 = 1414.2;
+const TICKS_PER_MM: f64 = 80.0;
+
+const TOPPRA: &str = include_str!("toppra_side.py");
+
+/// A figure that is wanted.
+struct Goal {
+    what: &'static str,
+    unit: &'static str,
+    figure: f64,
+    wanted: f64,
+    at_most: bool,
+}
+
+impl Goal {
+    fn met(&self) -> bool {
+        if self.at_most { self.figure <= self.wanted } else { self.figure >= self.wanted }
+    }
+}
+
+pub(super) fn run(python: &str) -> Result<bool> {
+    let machine = corexy()?;
+    let points = workload::points(POINTS);
+    let length: f64 = points.windows(2).map(|w| (w[1] - w[0]).hypot()).sum();
+    let once = read(&points)?;
+    let tenfold = read(&workload::points(10 * POINTS))?;
+    println!("workload: {} points, {length:.3} mm, one stroke, as HPGL", points.len());
+
+    let settings =
+        Settings { tolerance: TOLERANCE, period_us: PERIOD_US, park: None, pen_speeds: Vec::new() };
+    let (trajectory, planning) = fastest(|| planner::plan(&machine, &once, &settings));
+    let trajectory = trajectory?;
+    let (tenfold_plan, tenfold_planning) = fastest(|| planner::plan(&machine, &tenfold, &settings));
+    let tenfold_plan = tenfold_plan?;
+    let peaks = Peaks::of(&machine, &trajectory);
+
+    let stages = Stages::of(&machine, &once)?;
+    let ten_stages = Stages::of(&machine, &tenfold)?;
+    let emission = emission(&machine, &trajectory)?;
+    let tenfold_emission = emission_seconds(&machine, &tenfold_plan)?;
+    let arm = arm()?;
+    let mut fitted = once.clone();
+    fitted.transform(place(&arm, &once, &Wish { rotate: 0.0, size: Size::Fit })?);
+    let arm_trajectory = planner::plan(&arm, &fitted, &settings)?;
+    let arm_emission = self::emission(&arm, &arm_trajectory)?;
+
+    println!("{:<14} {:>10} {:>10} {:>10}", "CPU ms", "points", "10 times", "exponent");
+    for (name, one, ten) in [
+        ("path", stages.path, ten_stages.path),
+        ("lift", stages.lift, ten_stages.lift),
+        ("time law", stages.time_law, ten_stages.time_law),
+        ("all of plan", planning, tenfold_planning),
+    ] {
+        println!("{name:<14} {:>10.2} {:>10.2} {:>10.3}", 1e3 * one, 1e3 * ten, (ten / one).log10());
+    }
+    println!("cells: {} of {} joint paths", stages.cells, stages.paths.len());
+    println!("finite differences of {PERIOD_US} us: speed {:.5} of the limit", peaks.speed);
+    let tick_room = ACCELERATION * TICKS_PER_MM * (PERIOD_US as f64 * 1e-6).powi(2) + 2.0;
+    let goals = [
+        Goal {
+            what: "drawing time",
+            unit: "s",
+            figure: trajectory.times().drawing,
+            wanted: 207.0,
+            at_most: true,
+        },
+        Goal {
+            what: "largest acceleration, exact positions",
+            unit: "of the limit",
+            figure: peaks.acceleration,
+            wanted: 1.0 + 1e-6,
+            at_most: true,
+        },
+        Goal {
+            what: "largest second difference, whole ticks",
+            unit: "ticks",
+            figure: peaks.ticks,
+            wanted: tick_room,
+            at_most: true,
+        },
+        Goal {
+            what: "time law",
+            unit: "M nodes/s",
+            figure: 1e-6 * stages.cells as f64 / stages.time_law,
+            wanted: 1.0,
+            at_most: false,
+        },
+        Goal {
+            what: "rows to CSV, CoreXY",
+            unit: "M rows/s",
+            figure: 1e-6 * emission,
+            wanted: 10.0,
+            at_most: false,
+        },
+        Goal {
+            what: "rows to CSV, arm",
+            unit: "M rows/s",
+            figure: 1e-6 * arm_emission,
+            wanted: 10.0,
+            at_most: false,
+        },
+        Goal {
+            what: "growth of planning, 1 to 10 times",
+            unit: "exponent",
+            figure: (tenfold_planning / planning).log10(),
+            wanted: 1.05,
+            at_most: true,
+        },
+        Goal {
+            what: "growth of emission, 1 to 10 times",
+            unit: "exponent",
+            figure: (tenfold_emission / (trajectory.row_count() as f64 / emission)).log10(),
+            wanted: 1.05,
+            at_most: true,
+        },
+    ];
+    for goal in &goals {
+        let relation = if goal.at_most { "at most" } else { "at least" };
+        let verdict = if goal.met() { "" } else { "   MISSED" };
+        println!(
+            "{:<40} {:>10.4} {:<12} ({relation} {:.4}){verdict}",
+            goal.what, goal.figure, goal.unit, goal.wanted
+        );
+    }
+    toppra(python, &points, &machine, &stages)?;
+    Ok(goals.iter().all(Goal::met))
+}
+
+/// The workload as the pipeline gets it: written as HPGL and read back.
+fn read(points: &[Point]) -> Result<Drawing> {
+    let reading = hpgl::read(workload::hpgl(points).as_bytes(), &hpgl::Options::default());
+    anyhow::ensure!(reading.diagnostics.is_empty(), "the workload is read with {:?}", reading.diagnostics);
+    let page = reading.pages.into_iter().next().context("a reading without a page")?;
+    anyhow::ensure!(page.drawing.strokes.len() == 1, "the workload is one stroke");
+    Ok(page.drawing)
+}
+
+fn motor(name: &str, counts: f64, speed: f64, acceleration: f64) -> Motor {
+    let (max_speed, max_acceleration) = (counts * speed, counts * acceleration);
+    Motor { name: name.into(), counts, offset: 0.0, max_speed, max_acceleration, max_jerk: None }
+}
+
+fn corexy() -> Result<Machine> {
+    let joint = Joint { min: -50.0, max: 400.0 };
+    Ok(Machine::new(MachineParts {
+        name: "workload".into(),
+        geometry: Geometry::Cartesian(Cartesian),
+        joints: [joint; 2],
+        min_dexterity: 0.0,
+        coupling: [[1.0, 1.0], [1.0, -1.0]],
+        motors: ["a", "b"].map(|name| motor(name, TICKS_PER_MM, SPEED, ACCELERATION)),
+        pen: PenLift { max_speed: 1000.0, lift_time: 0.15, drop_time: 0.15 },
+        sheet: Rect::new(0.0, 0.0, 400.0, 400.0),
+        start: Joints::zeros(),
+        period: 0.01,
+    })?)
+}
+
+/// An arm of two links whose motors both stand in its base, for the cost of sines.
+fn arm() -> Result<Machine> {
+    let counts = 32_000.0 / std::f64::consts::TAU;
+    Ok(Machine::new(MachineParts {
+        name: "arm".into(),
+        geometry: Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
+        joints: [Joint::FREE; 2],
+        min_dexterity: 0.1,
+        coupling: [[1.0, 0.0], [0.0, 1.0]],
+        motors: ["arm1", "arm2"].map(|name| motor(name, counts, 1.0, 5.0)),
+        pen: PenLift { max_speed: 60.0, lift_time: 0.15, drop_time: 0.15 },
+        sheet: Rect::new(12.7, 76.2, 228.6, 355.6),
+        start: Joints::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
+        period: 0.01,
+    })?)
+}
+
+/// Largest finite differences over the rows of a plan.
+struct Peaks {
+    /// As shares of the limits, of the exact positions.
+    speed: f64,
+    acceleration: f64,
+    /// Largest second difference of the whole ticks.
+    ticks: f64,
+}
+
+impl Peaks {
+    fn of(machine: &Machine, trajectory: &Trajectory<'_>) -> Self {
+        let period = PERIOD_US as f64 * 1e-6;
+        let mut peaks = Self { speed: 0.0, acceleration: 0.0, ticks: 0.0 };
+        let mut last: Option<(u64, [f64; 2], [i64; 2])> = None;
+        // Differences to the row before; at rest before the first.
+        let (mut step, mut tick_step) = ([0.0; 2], [0; 2]);
+        for row in trajectory.rows() {
+            let (t_us, exact, ticks) = (row.row.t_us, row.exact, row.row.ticks);
+            if let Some((before, from, from_ticks)) = last {
+                if t_us - before > PERIOD_US {
+                    // Rows are left out only where nothing moves.
+                    (step, tick_step) = ([0.0; 2], [0; 2]);
+                }
+                for (k, motor) in machine.motors().iter().enumerate() {
+                    let (now, now_ticks) = (exact[k] - from[k], ticks[k] - from_ticks[k]);
+                    let acceleration = (now - step[k]).abs() / (period * period);
+                    peaks.speed = peaks.speed.max(now.abs() / period / motor.max_speed);
+                    peaks.acceleration = peaks.acceleration.max(acceleration / motor.max_acceleration);
+                    peaks.ticks = peaks.ticks.max((now_ticks - tick_step[k]).abs() as f64);
+                    (step[k], tick_step[k]) = (now, now_ticks);
+                }
+            }
+            last = Some((t_us, exact, ticks));
+        }
+        peaks
+    }
+}
+
+/// The planner's stages one by one, s of CPU.
+struct Stages {
+    path: f64,
+    lift: f64,
+    time_law: f64,
+    cells: usize,
+    paths: Vec<JointPath>,
+    profiles: Vec<Profile>,
+}
+
+impl Stages {
+    fn of(machine: &Machine, drawing: &Drawing) -> Result<Self> {
+        let budget = Budget {
+            chord: 0.5 * TOLERANCE,
+            simplify: 0.3 * TOLERANCE,
+            blend: 0.7 * TOLERANCE,
+            row: f64::INFINITY,
+        };
+        let stroke = drawing.strokes.first().context("a workload without strokes")?;
+        let (sections, path) = fastest(|| sections(stroke, &budget));
+        let (paths, lift) = fastest(|| {
+            let lifted = sections.iter().map(|section| {
+                let pose = machine
+                    .poses(section[0].curve.start(), &machine.start())
+                    .map_err(|fault| anyhow::anyhow!("{fault}"))?;
+                Ok(JointPath::lift(machine, section.clone(), pose[0], TOLERANCE)?)
+            });
+            lifted.collect::<Result<Vec<JointPath>>>()
+        });
+        let paths = paths?;
+        let cap = SpeedCap { pen: machine.pen().max_speed, row_deviation: f64::INFINITY, period: 1e-3 };
+        let law = || paths.iter().map(|path| profile(machine, path, &cap)).collect::<Vec<Profile>>();
+        let (profiles, time_law) = fastest(law);
+        let cells = paths.iter().map(|path| path.cells.len()).sum();
+        Ok(Self { path, lift, time_law, cells, paths, profiles })
+    }
+}
+
+/// Rows a second through inverse kinematics, rounding and CSV.
+fn emission(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f64> {
+    Ok(trajectory.row_count() as f64 / emission_seconds(machine, trajectory)?)
+}
+
+fn emission_seconds(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f64> {
+    let header = plan::Header {
+        machine: machine.name().into(),
+        motors: machine.motors().clone().map(|motor| plan::Motor {
+            name: motor.name,
+            limits: plan::Limits { speed: motor.max_speed, acceleration: motor.max_acceleration, jerk: None },
+        }),
+        placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        period_us: PERIOD_US,
+        rows: trajectory.row_count(),
+        duration_us: trajectory.duration_us(),
+    };
+    let rows = || trajectory.rows().map(|row| row.row);
+    let (written, seconds) = fastest(|| formats::csv::write(&header, rows(), &mut std::io::sink()));
+    written?;
+    Ok(seconds)
+}
+
+/// toppra over the same points, and over the same path with the same limits.
+fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) -> Result<()> {
+    let folder = tempfile::tempdir()?;
+    let file = |name: &str, text: &str| -> Result<std::path::PathBuf> {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text)?;
+        Ok(path)
+    };
+    let script = file("toppra_side.py", TOPPRA)?;
+    let mut text = String::new();
+    for point in points {
+        writeln!(text, "{} {}", point.x + point.y, point.x - point.y)?;
+    }
+    let belts = file("points.txt", &text)?;
+    let longest = stages.paths.iter().max_by_key(|path| path.cells.len()).context("no joint path")?;
+    let nodes = file("nodes.txt", &nodes(machine, longest))?;
+    let Some(said) = run_python(python, &script, &belts, &nodes)? else {
+        println!(
+            "toppra is not installed for `{python}` (python3 -m pip install toppra numpy): nothing beside our figures"
+        );
+        return Ok(());
+    };
+    println!(
+        "\n{:<38} {:>8} {:>9} {:>9} {:>10} {:>11} {:>8}  on one path",
+        "", "nodes", "CPU ms", "M nodes/s", "motion s", "worst a", "mm off"
+    );
+    let ours = stages.profiles.iter().map(|profile| profile.duration).sum::<f64>();
+    let rate = 1e-6 * stages.cells as f64;
+    println!(
+        "{:<38} {:>8} {:>9.2} {:>9.4} {ours:>10.3}",
+        "plotplan",
+        stages.cells,
+        1e3 * stages.time_law,
+        rate / stages.time_law
+    );
+    for line in said.lines() {
+        let mut fields = line.split('\t');
+        let name = format!("toppra: {}", fields.next().unwrap_or_default());
+        let mut number = || fields.next().and_then(|field| field.parse::<f64>().ok()).unwrap_or(f64::NAN);
+        let (count, cpu, motion, worst, off) = (number(), number(), number(), number(), number());
+        if motion.is_nan() {
+            println!("{name:<38} {count:>8} {:>9.2}  finds no time law", 1e3 * cpu);
+            continue;
+        }
+        println!(
+            "{name:<38} {count:>8} {:>9.2} {:>9.4} {motion:>10.3} {worst:>11.3} {off:>8.3}  {:.0} times as long",
+            1e3 * cpu,
+            1e-6 * count / cpu,
+            cpu / stages.time_law
+        );
+    }
+    Ok(())
+}
+
+/// What the script says; nothing where there is no Python or no toppra.
+fn run_python(python: &str, script: &Path, points: &Path, nodes: &Path) -> Result<Option<String>> {
+    let Ok(output) = Command::new(python).arg(script).arg(points).arg(nodes).output() else {
+        return Ok(None);
+    };
+    if output.status.code() == Some(3) {
+        return Ok(None);
+    }
+    anyhow::ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Ok(Some(String::from_utf8(output.stdout)?))
+}
+
+/// `s q q' q''` in mm of belt at the start of every stretch of a path, none longer than 0.2 mm, and at its end.
+fn nodes(machine: &Machine, path: &JointPath) -> String {
+    let Course::Drawn(start, section) = &path.course else { return String::new() };
+    let (mut text, mut s, mut near) = (String::new(), 0.0, *start);
+    let mut node = |s: f64, piece: usize, at: f64| {
+        let piece = &section[piece];
+        let t = (at * piece.rate).min(1.0);
+        let point = Segment::eval(&piece.curve, t);
+        near = machine.pose_near(point, &near).unwrap_or(near);
+        let (velocity, acceleration) = piece.curve.derivatives(t);
+        let (first, second) =
+            machine.motor_derivatives(&near, piece.rate * velocity, piece.rate * piece.rate * acceleration);
+        let (q, first, second) =
+            (machine.ticks(&near) / TICKS_PER_MM, first / TICKS_PER_MM, second / TICKS_PER_MM);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{s} {} {} {} {} {} {}", q.x, q.y, first.x, first.y, second.x, second.y);
+    };
+    let mut last = (0, 0.0);
+    for cell in &path.cells {
+        let parts = (cell.length / 0.2).ceil().max(1.0);
+        for k in 0..parts as u32 {
+            let from = cell.length * f64::from(k) / parts;
+            node(s + from, cell.piece, cell.start + from);
+        }
+        s += cell.length;
+        last = (cell.piece, cell.start + cell.length);
+    }
+    node(s, last.0, last.1);
+    text
+}
