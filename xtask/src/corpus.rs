@@ -70,7 +70,7 @@ fn next<T>(queue: &Mutex<impl Iterator<Item = T>>) -> Option<T> {
     queue.lock().ok()?.next()
 }
 
-fn find(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
+pub(crate) fn find(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
     for entry in std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
         let path = entry?.path();
         if path.is_dir() {
@@ -85,7 +85,7 @@ fn find(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-fn build() -> Result<PathBuf> {
+pub(crate) fn build() -> Result<PathBuf> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let built = Command::new(cargo)
         .args(["build", "--release", "--quiet", "--package", "plotplan", "--message-format", "json"])

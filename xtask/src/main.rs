@@ -1,4 +1,4 @@
-//! Chores of the repository: `cargo xtask tidy`, `cargo xtask corpus DIR`, `cargo xtask bench plan`.
+//! Chores of the repository; `cargo xtask` alone lists them.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "chores talk to whoever runs them")]
 #![expect(clippy::disallowed_methods, reason = "chores look at the clock and at cargo's environment")]
 
@@ -6,12 +6,16 @@ use std::process::ExitCode;
 
 mod bench;
 mod corpus;
+mod order;
 mod tidy;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   tidy          fail when a crate depends on one that it must not know, and on other untidiness
   corpus DIR    run the release binary over every drawing below DIR: no panic, no hang, no plan without a certificate
+  order DIR     plan every drawing below DIR in the file's order and in ours, on two machines: a table of times
+  bench order GENERATOR
+                order the drawings that the script GENERATOR makes (python3 with numpy), beside references
   bench plan [PYTHON]
                 the planner's workload: duration, limits and speed, beside toppra where PYTHON (python3) has it";
 
@@ -20,6 +24,8 @@ fn main() -> ExitCode {
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["tidy"] => tidy::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
+        ["bench", "order", generator] => order::bench(generator.as_ref()),
+        ["order", folder] => order::real(folder.as_ref()),
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),
         _ => {

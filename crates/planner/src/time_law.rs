@@ -175,7 +175,6 @@ impl Bounds {
         for (first, second) in self.first.iter().zip(self.second) {
             top = top.min((self.twice + first * (b0 + b1)) / (2.0 * first + self.twice * second));
         }
-        let higher = b0.max(b1);
         let mut start = cell.start;
         let mut push = |length: f64, from: f64, to: f64| {
             if length > 0.0 && from + to > 0.0 {
@@ -186,17 +185,24 @@ impl Bounds {
             }
             start += length;
         };
-        // Small peaks between cells whose bounds differ a little would only make the motors chatter.
-        let worthwhile = if self.second == [0.0; 3] { 1.0 + 1e-9 } else { 1.1 };
-        if top <= worthwhile * higher {
-            push(cell.length, b0, b1);
-            return;
-        }
         let strongest =
             self.first.iter().zip(self.second).map(|(first, second)| (1.0 - second * top) / first);
         let u = strongest.fold(f64::INFINITY, f64::min);
-        let up = ((top - b0) / (2.0 * u)).min(cell.length);
-        let down = ((top - b1) / (2.0 * u)).min(cell.length - up);
+        let (up, down) = ((top - b0) / (2.0 * u), (top - b1) / (2.0 * u));
+        let cruise = cell.length - up - down;
+        // Not where the bound is too coarse for a peak, and not for small gains: between cells whose bounds differ a
+        // little they would only make the motors chatter.
+        let over = |length: f64, b: f64| 2.0 * length / (b.sqrt() + top.sqrt());
+        let even = 2.0 * cell.length / (b0.sqrt() + b1.sqrt());
+        let peaked = over(up, b0) + cruise / top.sqrt() + over(down, b1);
+        let worthwhile = if self.second == [0.0; 3] { 1.0 - 1e-9 } else { 0.99 };
+        let fits = top >= b0.max(b1) && u > 0.0 && cruise >= -1e-9 * cell.length;
+        if !(fits && peaked < worthwhile * even) {
+            push(cell.length, b0, b1);
+            return;
+        }
+        let up = up.min(cell.length);
+        let down = down.min(cell.length - up);
         push(up, b0, top);
         push(cell.length - up - down, top, top);
         push(down, top, b1);

@@ -153,7 +153,9 @@ fn trimmed(piece: &Segment, start: f64, end: f64) -> Option<Segment> {
 /// The parameter about `leg` mm from an end: exactly so on lines and circles, by the speed at the end on other curves.
 fn parameter(piece: &Segment, leg: f64, at_start: bool) -> f64 {
     let end = if at_start { 0.0 } else { 1.0 };
-    let share = (leg / piece.derivatives(end).0.hypot2().sqrt()).min(0.5 * (1.0 + 1e-9));
+    // A line may give more than half of itself to one blend, where the other wants less.
+    let most = if matches!(piece, Segment::Line(_)) { 1.0 } else { 0.5 * (1.0 + 1e-9) };
+    let share = (leg / piece.derivatives(end).0.hypot2().sqrt()).min(most);
     if at_start { share } else { 1.0 - share }
 }
 

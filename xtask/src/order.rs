@@ -1,0 +1,117 @@
+//! What ordering brings: on the benchmark's drawings beside its references, and on real drawings in plan time.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context as _, Result};
+
+/// Drawings of the generator with the travel (mm) that issue 5 asks for, vpype's `--two-opt` and LKH's, where known.
+const REFERENCES: [(&str, f64, Option<f64>, Option<f64>); 9] = [
+    ("text_1k", 5000.0, Some(5475.0), Some(4954.5)),
+    ("hatch_1k", 1370.0, Some(1392.0), Some(1317.8)),
+    ("flow_1k", 4790.0, Some(5294.0), Some(4672.8)),
+    ("text_10k", 17_000.0, Some(18_144.0), None),
+    ("hatch_10k", 4900.0, Some(5059.0), None),
+    ("flow_10k", 15_950.0, Some(17_355.0), None),
+    ("text_100k", 51_500.0, None, None),
+    ("hatch_100k", 19_000.0, None, None),
+    ("flow_100k", 53_000.0, None, None),
+];
+
+/// Makes the benchmark's drawings with the generator (a Python script that needs numpy) and orders them; true if every
+/// target is met.
+pub(crate) fn bench(generator: &Path) -> Result<bool> {
+    let work = tempfile::tempdir()?;
+    let generator =
+        generator.canonicalize().with_context(|| format!("no generator {}", generator.display()))?;
+    let made = Command::new("python3")
+        .arg(&generator)
+        .current_dir(work.path())
+        .output()
+        .context("cannot run python3")?;
+    anyhow::ensure!(
+        made.status.success(),
+        "the generator failed:\n{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    let mut met = true;
+    for (name, target, vpype, lkh) in REFERENCES {
+        let run = Command::new(&cargo)
+            .args(["run", "--quiet", "--release", "--package", "ordering", "--example", "bench_order", "--"])
+            .arg(work.path().join(format!("{name}.hpgl")))
+            .current_dir(crate::top())
+            .output()
+            .context("cannot run cargo")?;
+        anyhow::ensure!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let said = String::from_utf8_lossy(&run.stdout).trim().to_owned();
+        let shown = |known: Option<f64>| known.map_or("-".into(), |mm| format!("{mm}"));
+        println!("{said}\n    target {target}, vpype --two-opt {}, LKH {}", shown(vpype), shown(lkh));
+        met &= travel_of(&said).is_some_and(|mm| mm <= target);
+    }
+    Ok(met)
+}
+
+/// The last of the numbers followed by "mm" in what the example says.
+fn travel_of(said: &str) -> Option<f64> {
+    let words: Vec<&str> = said.split_whitespace().collect();
+    let before_unit = words.windows(2).filter(|pair| pair[1].starts_with("mm"));
+    before_unit.filter_map(|pair| pair[0].parse().ok()).next_back()
+}
+
+/// Plans every drawing below a folder in the file's order and in ours, on two machines, and prints the times as a table.
+pub(crate) fn real(folder: &Path) -> Result<bool> {
+    let binary = crate::corpus::build()?;
+    let mut drawings: Vec<PathBuf> = Vec::new();
+    crate::corpus::find(folder, &mut drawings)?;
+    drawings.sort();
+    let mut never_worse = true;
+    let mut sums = [[0.0; 2]; 2];
+    for drawing in &drawings {
+        let mut row = String::new();
+        for (machine, sum) in ["coaxial", "corexy"].into_iter().zip(&mut sums) {
+            let times = ["file", "optimize"].map(|order| duration(&binary, drawing, machine, order));
+            let [Some(before), Some(after)] = times else { continue };
+            never_worse &= after <= before + 0.5;
+            (sum[0], sum[1]) = (sum[0] + before, sum[1] + after);
+            let _ = write!(row, " | {before:.0} | {after:.0} | {:.1} %", 100.0 * (1.0 - after / before));
+        }
+        if !row.is_empty() {
+            let name = drawing.file_name().unwrap_or_default().to_string_lossy();
+            println!("| {name}{row} |");
+        }
+    }
+    for (machine, [before, after]) in ["coaxial", "corexy"].into_iter().zip(sums) {
+        println!(
+            "all on {machine}: {before:.0} s in the file's order, {after:.0} s in ours, {:.1} % less",
+            100.0 * (1.0 - after / before)
+        );
+    }
+    Ok(never_worse)
+}
+
+/// The plan's duration, s; nothing if the drawing cannot be planned.
+fn duration(binary: &Path, drawing: &Path, machine: &str, order: &str) -> Option<f64> {
+    let run = Command::new(binary)
+        .arg("convert")
+        .arg(drawing)
+        .args(["--fit", "--machine", machine, "--order", order, "--format", "csv", "--report", "json", "-o"])
+        .arg(if cfg!(windows) { "NUL" } else { "/dev/null" })
+        .output()
+        .ok()?;
+    let said = String::from_utf8_lossy(&run.stderr);
+    let report: serde_json::Value = serde_json::from_str(said.lines().last()?).ok()?;
+    report["summary"]["duration_s"].as_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn travel_is_the_last_length() {
+        assert_eq!(travel_of("text_1k: 891 strokes, 12930.1 mm -> 4986.2 mm in 0.7 s"), Some(4986.2));
+        assert_eq!(travel_of("nothing"), None);
+    }
+}
