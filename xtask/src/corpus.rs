@@ -11,8 +11,8 @@ use anyhow::{Context as _, Result};
 /// How long one run may take,
 const LIMIT: Duration = Duration::from_secs(10);
 
-/// and how much longer for each kilometre of ink beyond the first: such plans take days to draw.
-const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(20);
+/// and how much longer for each kilometre of ink: with six kilometres, a plan takes two days to draw.
+const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(30);
 const MACHINES: [&str; 2] = ["coaxial", "polar"];
 const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 
@@ -106,7 +106,7 @@ pub(crate) fn build() -> Result<PathBuf> {
 /// One row of the table, and whether all of it is as it should be.
 fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(String, bool)> {
     let check = start(binary, &["check".as_ref(), drawing.as_os_str()], output, LIMIT)?;
-    let limit = LIMIT + LIMIT_A_KILOMETRE.mul_f64((kilometres(&check.answered) - 1.0).max(0.0));
+    let limit = LIMIT + LIMIT_A_KILOMETRE.mul_f64(kilometres(&check.answered));
     let mut faults: Vec<String> = judge_check(&check).into_iter().collect();
     let mut results = Vec::new();
     for machine in MACHINES {

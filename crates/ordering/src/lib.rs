@@ -147,13 +147,14 @@ fn by_pen(strokes: Vec<Stroke>, pen_order: Option<&[Pen]>) -> Vec<Vec<Stroke>> {
 fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -> Vec<Stroke> {
     let mut ordered: Vec<Stroke> = Vec::new();
     let last = pens.len().saturating_sub(1);
+    let all = pens.iter().map(Vec::len).sum();
     for (at, strokes) in pens.into_iter().enumerate() {
         let start = ordered.last().map_or(options.start, |stroke| Some(stroke.end()));
         let park = if at == last { options.park } else { None };
-        let mut strokes = search(strokes, start, park, cost, options, options.effort);
+        let mut strokes = search(strokes, start, park, cost, options, (options.effort, all));
         // Where closed strokes begin, they are reached elsewhere: another order may be better now.
         if seam::choose_seams(&mut strokes, start, park, cost) {
-            strokes = search(strokes, start, park, cost, options, options.effort.min(1));
+            strokes = search(strokes, start, park, cost, options, (options.effort.min(1), all));
             seam::choose_seams(&mut strokes, start, park, cost);
         }
         ordered.append(&mut strokes);
@@ -161,14 +162,15 @@ fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -
     ordered
 }
 
-/// Orders the strokes of a pen; closed strokes keep where they begin.
+/// Orders the strokes of a pen; closed strokes keep where they begin. The effort is that for so many strokes in all, of
+/// which this pen gets its share.
 fn search(
     strokes: Vec<Stroke>,
     start: Option<Point>,
     park: Option<Point>,
     cost: &dyn Cost,
     options: &Options,
-    effort: u8,
+    effort: (u8, usize),
 ) -> Vec<Stroke> {
     let ends = strokes.iter().map(|stroke| [stroke.start(), stroke.end()]);
     let problem = Problem::new(ends, start, park, options.keep_direction, cost);

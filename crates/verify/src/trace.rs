@@ -40,8 +40,11 @@ const TIGHTEST: f64 = 1.0 / 5000.0;
 /// A run is not halved more often than this.
 const HALVINGS: u32 = 24;
 
-/// So many pieces near a run are enough to follow the nearest.
+/// So many pieces near a run are enough to follow the nearest,
 const CROWD: usize = 48;
+
+/// as long as they are within this share of the radius: less than a plan that holds may be off.
+const FOLLOWED: f64 = 0.75;
 
 /// Where in the table something happens.
 #[derive(Clone, Copy, Debug)]
@@ -121,6 +124,8 @@ pub(crate) struct Trace {
     followed: Vec<Range<u32>>,
     /// The latest runs while strokes are followed, with those before them.
     recent: VecDeque<(Run, Option<Run>)>,
+    /// Bounds found along a run: at either end of a part of it, and the part's length.
+    bounds: Vec<([f64; 2], f64)>,
     /// Working memory of [`Near::bound`]: distances of pieces, and which.
     candidates: Vec<(f64, u32)>,
     distances: Histogram,
@@ -145,6 +150,7 @@ impl Trace {
             follows,
             followed: Vec::new(),
             recent: VecDeque::new(),
+            bounds: Vec::new(),
             candidates: Vec::new(),
             distances: Histogram::new(),
             worst: None,
@@ -251,7 +257,6 @@ impl Trace {
         }
 
         let length = distance(run.from, run.to);
-        self.length += length;
         let ends = [(run.from, nearest[0].0), (run.to, nearest[1].0)];
         let mut near = Near {
             strokes,
@@ -260,18 +265,30 @@ impl Trace {
             tolerance: self.tolerance,
             largest: self.worst.map_or(0.0, |worst| worst.mm - run.error),
         };
-        let distances = &mut self.distances;
         let mut largest = 0.0_f64;
         let all = 0..near.candidates.len();
+        let bounds = &mut self.bounds;
+        bounds.clear();
         near.bound(all, ends, common, HALVINGS, &mut |[from, to], length| {
             largest = largest.max(from.max(to) + run.error);
+            bounds.push(([from, to], length));
+        });
+        if following && largest > FOLLOWED * self.radius {
+            // Something else may be nearer.
+            self.followed.clear();
+            self.recent.pop_back();
+            self.measure(target, run, before);
+            return;
+        }
+        self.length += length;
+        for &([from, to], length) in &self.bounds {
             // Along the run the distance is at most what evenly leads from the one end's to the other's.
             let steps = ((from - to).abs() / (0.1 * largest + 1e-12)).ceil().clamp(1.0, 8.0);
             for step in 0..steps as usize {
                 let t = if to > from { step + 1 } else { step } as f64 / steps;
-                distances.add(from + t * (to - from) + run.error, length / steps);
+                self.distances.add(from + t * (to - from) + run.error, length / steps);
             }
-        });
+        }
         if self.worst.is_none_or(|worst| largest > worst.mm) {
             let end = usize::from(nearest[1].0 > nearest[0].0);
             self.worst = Some(Worst {
@@ -340,7 +357,7 @@ impl Trace {
         // Near enough that a plan that holds need not look further.
         let near = |point: Point| {
             let mut pieces = self.candidates.iter().map(|(_, index)| &strokes.pieces[*index as usize]);
-            pieces.any(|piece| piece.distance(piece.local(point)) <= 0.75 * self.radius)
+            pieces.any(|piece| piece.distance(piece.local(point)) <= FOLLOWED * self.radius)
         };
         if near(run.from) && near(run.to) {
             return true;

@@ -27,12 +27,13 @@ const MIRRORED: (usize, u64) = (950, 50);
 const SEVERAL_STARTS: usize = 3000;
 
 /// The best tour found from several starts, the file's own order among them: never worse than that.
-pub(crate) fn solve(problem: &Problem, effort: u8) -> Vec<End> {
+pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize)) -> Vec<End> {
     let starts =
         [problem.file_order(), construct::nearest_neighbour(problem), construct::greedy_edge(problem)];
     let mut best = Best::new(problem, starts[0].clone());
     let n = problem.stroke_count();
-    let work = work_of(n, effort);
+    // Several pens share the work of one drawing.
+    let work = (u128::from(work_of(all, effort)) * n as u128 / all.max(n) as u128) as u64;
     if n <= SEVERAL_STARTS {
         for start in &starts[1..] {
             best.offer(improve(problem, start.clone(), work / 2));
@@ -51,7 +52,7 @@ pub(crate) fn solve(problem: &Problem, effort: u8) -> Vec<End> {
 /// How many candidates may be looked at.
 fn work_of(strokes: usize, effort: u8) -> u64 {
     let n = strokes as u64;
-    let default = 50_000 * n.min(1000) + 2000 * n.min(10_000) + 2500 * n;
+    let default = 50_000 * n.min(1000) + 4500 * n.min(10_000) + 600 * n;
     match effort {
         0 => 0,
         1 => default / 8,
