@@ -3,10 +3,11 @@
 //! ```text
 //! Stroke --path--> smooth sections (mm) --lift--> joint path --time_law--> profile --trajectory--> rows of ticks
 //! ```
-//! 1. [`path`]: a stroke's pieces are cleaned and cut into **sections** at every corner: the pen rests between sections.
-//! 2. [`lift`]: a section is lifted into joint space as a [`JointPath`]: **cells** on which the pen's curve, the motors'
-//!    first and second derivative along it, and the bend between rows are bounded.
-//! 3. [`time_law`]: along a joint path, the fastest speed profile that those bounds allow, from rest to rest.
+//! 1. [`path`]: a stroke becomes smooth **sections**: fewer pieces within the tolerance, corners as parabolas. The pen rests
+//!    only where it turns back.
+//! 2. [`lift`]: a section is lifted into joint space as a [`JointPath`]: **cells** with the motors' first and second
+//!    derivatives along it at start, middle and end, and how much rows bend against it.
+//! 3. [`time_law`]: along a joint path, the fastest speed profile that the motors and the rows allow, from rest to rest.
 //! 4. [`trajectory`]: sections, travel in joint space, pen lifts and drops one after the other, sampled at a fixed
 //!    period into rows whose ticks are rounded from exact positions, so that nothing drifts.
 //!

@@ -25,12 +25,6 @@ const TURNS_BACK: f64 = -0.9962;
 /// Blends shorter than this are not worth a piece, mm.
 const SHORTEST: f64 = 1e-6;
 
-/// End speed squared, mm²/s², of a blend that deviates by `deviation` mm at a corner between the unit vectors `u` and `v`
-/// under a Cartesian acceleration of `acceleration` mm/s².
-pub fn corner_speed_squared(u: Vec2, v: Vec2, deviation: f64, acceleration: f64) -> f64 {
-    8.0 * deviation * acceleration / (v - u).hypot2()
-}
-
 /// The joint after each piece but the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Joint {

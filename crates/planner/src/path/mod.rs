@@ -12,8 +12,6 @@ mod zones;
 
 use drawing::{Line, Point, Segment, Stroke, Vec2};
 
-pub use blend::corner_speed_squared;
-
 /// Vertices that lie on the straight line between their neighbours, to this distance in mm, are not corners.
 const COLLINEAR: f64 = 1e-9;
 
