@@ -15,7 +15,7 @@
 //! `c² = 8 d a / |v - u|²`. A circular arc of the same deviation allows `a d / (1 / cos(theta/2) - 1)`: the same for
 //! small turns, 1.66 times less at a right angle. The vertex is missed by d and the blend strays by less.
 
-use drawing::{CubicBez, Point, Segment, Vec2};
+use drawing::{CubicBez, Point, Segment};
 
 use super::{direction_at, distance, is_smooth};
 
@@ -197,7 +197,7 @@ fn to_chord(p: Point, a: Point, b: Point) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use drawing::{EllipticArc, Line};
+    use drawing::{EllipticArc, Line, Vec2};
     use proptest::prelude::*;
 
     use super::*;
