@@ -1,7 +1,7 @@
 //! Lifting the pen's path into joint space, adaptively, with what a time law must know.
 
 use drawing::{Point, Segment};
-use kinematics::{Fault, Joints, Machine, OutOfReach};
+use kinematics::{Fault, Joints, Machine, OutOfReach, Unreachable};
 use nalgebra::Vector2;
 
 use crate::path::{Piece, Section};
@@ -62,6 +62,17 @@ const LARGEST_BULGE: f64 = 0.02;
 /// Cells are not cut shorter than this, mm.
 const SHORTEST: f64 = 1e-5;
 
+/// The path's derivatives at one place.
+#[derive(Clone, Copy)]
+struct Rates {
+    first: Vector2<f64>,
+    second: Vector2<f64>,
+    pen_speed: f64,
+    /// Curvature times speed², 1/mm.
+    turning: f64,
+    bend: f64,
+}
+
 /// The path and its derivatives at one place.
 #[derive(Clone, Copy)]
 struct Sample {
@@ -69,12 +80,7 @@ struct Sample {
     s: f64,
     point: Point,
     pose: Joints,
-    first: Vector2<f64>,
-    second: Vector2<f64>,
-    pen_speed: f64,
-    /// Curvature times speed², 1/mm.
-    turning: f64,
-    bend: f64,
+    rates: Rates,
 }
 
 impl JointPath {
@@ -119,6 +125,51 @@ impl JointPath {
             near = lifter.piece(index, piece, near)?;
         }
         Ok(Self { course: Course::Drawn(pose, section), cells: lifter.cells })
+    }
+}
+
+impl Cell {
+    /// Two cells in place of this one, with derivatives taken anew; nothing for travel, where there is nothing to gain,
+    /// and for cells too short to be cut.
+    pub(crate) fn halves(&self, machine: &Machine, course: &Course) -> Option<[Self; 2]> {
+        let Course::Drawn(_, section) = course else { return None };
+        if self.length <= 2.0 * SHORTEST {
+            return None;
+        }
+        let piece = &section[self.piece];
+        let at = |share: f64| Rates::at(machine, piece, self.start + share * self.length).ok();
+        let quarters = [at(0.0)?, at(0.25)?, at(0.5)?, at(0.75)?, at(1.0)?];
+        let half = |from: usize| {
+            let samples = [&quarters[from], &quarters[from + 1], &quarters[from + 2]];
+            let start = self.start + 0.25 * from as f64 * self.length;
+            let slack = 0.5 * bulge(machine, samples);
+            // What bounds the joints' bend holds for the whole cell, so for its halves.
+            Self {
+                bend: self.bend,
+                near_turn: self.near_turn,
+                ..Self::new(self.piece, start, 0.5 * self.length, samples, slack)
+            }
+        };
+        Some([half(0), half(2)])
+    }
+
+    fn new(piece: usize, start: f64, length: f64, samples: [&Rates; 3], slack: f64) -> Self {
+        Self {
+            length,
+            piece,
+            start,
+            first: samples.map(|rates| rates.first),
+            second: samples.map(|rates| rates.second),
+            pen_speed: samples.iter().map(|rates| rates.pen_speed).fold(0.0, f64::max),
+            bend: samples.iter().map(|rates| rates.bend).fold(0.0, f64::max),
+            near_turn: false,
+            slack,
+        }
+    }
+
+    /// Whether the motors move in proportion to the parameter, so that any even acceleration on it is even in the motors.
+    pub(crate) fn is_straight(&self) -> bool {
+        self.second.iter().all(|second| *second == Vector2::zeros())
     }
 }
 
@@ -193,7 +244,7 @@ impl Lifter<'_> {
         while let Some((a, b)) = pending.pop() {
             let middle = self.sample(piece, 0.5 * (a.s + b.s), a.pose)?;
             let length = b.s - a.s;
-            let bulge = self.bulge(&a, &middle, &b);
+            let bulge = bulge(self.machine, [&a.rates, &middle.rates, &b.rates]);
             if length > SHORTEST && (bulge > LARGEST_BULGE || !self.is_near(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
@@ -204,20 +255,10 @@ impl Lifter<'_> {
                 let min = self.machine.parts().min_dexterity;
                 return Err(OutOfReach { point: b.point, fault: Fault::Singular { dexterity: 0.0, min } });
             }
-            let samples = [a, middle, b];
-            let most = |of: fn(&Sample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
-            self.cells.push(Cell {
-                length,
-                piece: index,
-                start: a.s,
-                first: samples.map(|sample| sample.first),
-                second: samples.map(|sample| sample.second),
-                pen_speed: most(|sample| sample.pen_speed),
-                bend: most(|sample| sample.bend),
-                near_turn: piece.near_turn,
-                // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
-                slack: 0.5 * bulge,
-            });
+            let samples = [&a.rates, &middle.rates, &b.rates];
+            // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
+            let cell = Cell::new(index, a.s, length, samples, 0.5 * bulge);
+            self.cells.push(Cell { near_turn: piece.near_turn, ..cell });
         }
         Ok(())
     }
@@ -231,34 +272,9 @@ impl Lifter<'_> {
 
     /// Whether the cell is short enough for linear joint motion.
     fn is_near(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
-        let turning = a.turning.max(middle.turning).max(b.turning);
+        let turning = a.rates.turning.max(middle.rates.turning).max(b.rates.turning);
         let deviation = (self.machine.geometry().bend(&a.pose, &b.pose) + length * length * turning) / 8.0;
         self.turned(a, b) <= LARGEST_TURN && deviation <= self.tolerance
-    }
-
-    /// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
-    /// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
-    fn bulge(&self, a: &Sample, middle: &Sample, b: &Sample) -> f64 {
-        let motors = self.machine.motors();
-        let off = |x: f64, y: f64, z: f64| (y - 0.5 * (x + z)).abs();
-        let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);
-        let (mut turning, mut turning_off) = (0.0_f64, 0.0_f64);
-        for (k, motor) in motors.iter().enumerate() {
-            let of = |sample: &Sample| {
-                (sample.first[k] / motor.max_speed, sample.second[k] / motor.max_acceleration)
-            };
-            let (x, y, z) = (of(a), of(middle), of(b));
-            slowness = slowness.max(x.0.abs()).max(y.0.abs()).max(z.0.abs());
-            slowness_off = slowness_off.max(off(x.0, y.0, z.0));
-            turning = turning.max(x.1.abs()).max(y.1.abs()).max(z.1.abs());
-            turning_off = turning_off.max(off(x.1, y.1, z.1));
-        }
-        if slowness == 0.0 {
-            return 0.0;
-        }
-        let fastest = (self.machine.pen().max_speed / a.pen_speed.max(b.pen_speed)).min(1.0 / slowness);
-        let square_speed = (fastest * fastest).min(1.0 / turning);
-        slowness_off / slowness + turning_off * square_speed
     }
 
     fn sample(&self, piece: &Piece, s: f64, near: Joints) -> Result<Sample, OutOfReach> {
@@ -269,17 +285,58 @@ impl Lifter<'_> {
         if let Some(fault) = self.machine.joint_fault_between(&pose) {
             return Err(out(fault));
         }
+        Ok(Sample { s, point, pose, rates: Rates::of(self.machine, piece, t, &pose) })
+    }
+}
+
+impl Rates {
+    /// At `s` on a piece.
+    fn at(machine: &Machine, piece: &Piece, s: f64) -> Result<Self, Unreachable> {
+        let t = (s * piece.rate).min(1.0);
+        // Derivatives are the same at every turn about the base.
+        let pose = machine.geometry().inverse(piece.curve.eval(t))?;
+        Ok(Self::of(machine, piece, t, &pose))
+    }
+
+    /// At the curve's own parameter `t`, where the pose is `pose`.
+    fn of(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Self {
         let (velocity, acceleration) = piece.curve.derivatives(t);
         let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let pen_speed = velocity.hypot2().sqrt();
         let turning = velocity.cross(acceleration).abs() / pen_speed;
-        let geometry = self.machine.geometry();
-        let (rates, _) = geometry.path_derivatives(&pose, velocity, acceleration);
-        let (first, second) = self.machine.motor_derivatives(&pose, velocity, acceleration);
+        let geometry = machine.geometry();
+        let (rates, _) = geometry.path_derivatives(pose, velocity, acceleration);
+        let (first, second) = machine.motor_derivatives(pose, velocity, acceleration);
         // Along a straight line an uneven parameter bends nothing; on a turn all of p'' may.
         let bending =
             if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
-        let bend = bending + geometry.bend(&pose, &(pose + rates));
-        Ok(Sample { s, point, pose, first, second, pen_speed, turning, bend })
+        let bend = bending + geometry.bend(pose, &(pose + rates));
+        Self { first, second, pen_speed, turning, bend }
     }
 }
+
+/// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
+/// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
+fn bulge(machine: &Machine, [a, middle, b]: [&Rates; 3]) -> f64 {
+    let motors = machine.motors();
+    let off = |x: f64, y: f64, z: f64| (y - 0.5 * (x + z)).abs();
+    let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);
+    let (mut turning, mut turning_off) = (0.0_f64, 0.0_f64);
+    for (k, motor) in motors.iter().enumerate() {
+        let of = |rates: &Rates| {
+            (rates.first[k] / motor.max_speed, rates.second[k] / motor.max_acceleration)
+        };
+        let (x, y, z) = (of(a), of(middle), of(b));
+        slowness = slowness.max(x.0.abs()).max(y.0.abs()).max(z.0.abs());
+        slowness_off = slowness_off.max(off(x.0, y.0, z.0));
+        turning = turning.max(x.1.abs()).max(y.1.abs()).max(z.1.abs());
+        turning_off = turning_off.max(off(x.1, y.1, z.1));
+    }
+    if slowness == 0.0 {
+        return 0.0;
+    }
+    let fastest = (machine.pen().max_speed / a.pen_speed.max(b.pen_speed)).min(1.0 / slowness);
+    let square_speed = (fastest * fastest).min(1.0 / turning);
+    slowness_off / slowness + turning_off * square_speed
+}
+

@@ -143,7 +143,7 @@ pub fn check_reach(machine: &Machine, drawing: &Drawing) -> Result<(), PlanError
         inside.map_err(|source| PlanError::OutOfReach {
             stroke: index,
             pen: stroke.pen,
-            span: stroke.source,
+            span: stroke.source(),
             source,
         })?;
     }
@@ -177,7 +177,7 @@ impl<'a> Planner<'a, '_> {
             self.stroke(stroke).map_err(|source| PlanError::OutOfReach {
                 stroke: index,
                 pen: stroke.pen,
-                span: stroke.source,
+                span: stroke.source(),
                 source,
             })?;
         }

@@ -1,0 +1,253 @@
+//! What a cell allows, and the programs in two variables that the sweeps solve on it.
+//!
+//! With `b = (ds/dt)²` and `u = d²s/dt²`, so `db/ds = 2 u`, a motor with position m(s) has
+//!
+//! ```text
+//! speed         |m'| sqrt(b)     <= v      so  b <= (v / |m'|)²
+//! acceleration  |m' u + m'' b|   <= a      linear in (u, b)
+//! ```
+//! On a cell `u` is constant, so b is linear in s; where m' and m'' are linear too, `m' u + m'' b` is convex or concave
+//! enough that its bounds at the cell's start, middle and end hold between them (what is left is the cell's
+//! [`Cell::slack`], by which the limits are lowered). With `b(f) = b + 2 f length u` at the share f of the cell that is
+//! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
+//! two more near turns, where rows would cut them (see `path::zones`).
+//!
+//! The programs in (u, b) are solved in closed form by comparing every lower bound of u with every upper one.
+
+use kinematics::Machine;
+
+use super::{Limiting, Phase, SpeedCap};
+use crate::lift::Cell;
+
+/// The condition `|p u + r b| <= 1`, p >= 0, with b at the cell's start.
+#[derive(Clone, Copy, Debug, Default)]
+struct Strip {
+    p: f64,
+    r: f64,
+}
+
+/// A cell's conditions.
+#[derive(Clone, Debug)]
+pub(super) struct Bounds {
+    /// Three of each motor, at the cell's start, middle and end, and two near turns.
+    strips: [Strip; 8],
+    /// Twice the cell's length: b at its end is `b + twice * u`.
+    twice: f64,
+    /// The largest b anywhere on it by speed.
+    pub(super) cap: f64,
+    /// Whose speed that is.
+    capped_by: Cap,
+    /// For peaks inside the cell: bounds on |m'| / a and |m''| / a of each motor, and of the pen near a turn.
+    first: [f64; 3],
+    second: [f64; 3],
+    /// By how much the motors' limits were lowered, see [`Cell::slack`].
+    slack: f64,
+}
+
+/// What caps the speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Cap {
+    Pen,
+    Rows,
+    Motor(usize),
+}
+
+/// How a cell is run through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Run {
+    /// With one acceleration.
+    Even,
+    /// Up to this b over a length, along at it, and down again over another length.
+    Peak { b: f64, up: f64, down: f64 },
+}
+
+impl Bounds {
+    pub(super) fn new(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> Self {
+        let mut strips = [Strip::default(); 8];
+        let (mut first, mut second) = ([0.0_f64; 3], [0.0_f64; 3]);
+        let pen = cap.pen / cell.pen_speed;
+        let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
+        let (mut largest, mut capped_by) = (pen * pen, Cap::Pen);
+        let mut lower = |b: f64, by: Cap| {
+            if b < largest {
+                (largest, capped_by) = (b, by);
+            }
+        };
+        lower(rows / cell.bend, Cap::Rows);
+        for (k, motor) in machine.motors().iter().enumerate() {
+            let limit = motor.max_acceleration / (1.0 + cell.slack);
+            let mut fastest = 0.0_f64;
+            for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
+                let (m1, m2) = (cell.first[j][k] / limit, cell.second[j][k] / limit);
+                let p = m1 + 2.0 * share * cell.length * m2;
+                strips[3 * k + j] = if p < 0.0 { Strip { p: -p, r: -m2 } } else { Strip { p, r: m2 } };
+                first[k] = first[k].max(m1.abs());
+                second[k] = second[k].max(m2.abs());
+                fastest = fastest.max(cell.first[j][k].abs());
+            }
+            let speed = motor.max_speed / (fastest * (1.0 + cell.slack));
+            lower(speed * speed, Cap::Motor(k));
+        }
+        if cell.near_turn {
+            // |p'| |u| + bend b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
+            let (p, r) = (cell.pen_speed / rows, cell.bend / rows);
+            strips[6] = Strip { p, r };
+            strips[7] = Strip { p, r: -r };
+            (first[2], second[2]) = (p, r);
+        }
+        Self { strips, twice: 2.0 * cell.length, cap: largest, capped_by, first, second, slack: cell.slack }
+    }
+
+    /// The largest b at the start for which some u fulfils all conditions and leads into [0, next].
+    pub(super) fn largest(&self, next: f64) -> f64 {
+        // Of every pair of a lower and an upper bound of u: lower(b) <= upper(b).
+        let mut largest = f64::INFINITY;
+        let mut allow = |slope: f64, room: f64| {
+            if slope > 0.0 {
+                largest = largest.min(room / slope);
+            }
+        };
+        for (i, one) in self.strips.iter().enumerate() {
+            for other in &self.strips[i + 1..] {
+                // (-1 - r_i b) / p_i <= (1 - r_j b) / p_j, and with i and j exchanged.
+                allow((one.p * other.r - other.p * one.r).abs(), one.p + other.p);
+            }
+            // A motor that stands still here, whatever u.
+            if one.p == 0.0 {
+                allow(one.r.abs(), 1.0);
+            }
+            // (-1 - r b) / p <= (next - b) / twice: the end is not too fast.
+            allow(one.p - self.twice * one.r, one.p * next + self.twice);
+            // -b / twice <= (1 - r b) / p: the end is not below rest.
+            allow(self.twice * one.r - one.p, self.twice);
+        }
+        largest
+    }
+
+    /// The largest b at the end, at most `top`, that can be reached from b at the start.
+    pub(super) fn fastest(&self, b: f64, top: f64) -> f64 {
+        let highest =
+            |strip: &Strip| if strip.p > 0.0 { (1.0 - strip.r * b) / strip.p } else { f64::INFINITY };
+        let u = self.strips.iter().map(highest).fold(f64::INFINITY, f64::min);
+        (b + self.twice * u).clamp(0.0, top)
+    }
+
+    /// By how much the motors stay below their limits over the cell with an even acceleration, as a share of them; 0 if
+    /// nothing could be gained by cutting it.
+    pub(super) fn idleness(&self, b0: f64, b1: f64) -> f64 {
+        if self.is_straight() {
+            return 0.0;
+        }
+        let of = |share: f64, at: usize| {
+            let b = b0 + share * (b1 - b0);
+            1.0 - self.use_of(b0, b1, &[at, 3 + at, 6, 7]).1.max(b / self.cap)
+        };
+        (of(0.0, 0) + of(0.5, 1) + of(1.0, 2)) / 3.0 + self.slack
+    }
+
+    /// Whether a motor that is used hangs on the speed rather than on the acceleration: near a place where its m' vanishes
+    /// (a zero-inertia point) a larger b at the start of a cell allows only a smaller one at its end, so going as fast
+    /// as possible up to there is not the fastest way. With `b1 = b + twice (1 - r b) / p` that begins at `twice r = p`;
+    /// the shorter the cells, the narrower that region.
+    pub(super) fn hangs_on_speed(&self, b0: f64, b1: f64) -> bool {
+        let u = (b1 - b0) / self.twice;
+        self.strips[..6].iter().any(|strip| {
+            self.twice * strip.r.abs() > 0.5 * strip.p && (strip.p * u + strip.r * b0).abs() > 0.5
+        })
+    }
+
+    /// Of some strips the one that is used most from b0 to b1, and by how much of its width.
+    fn use_of(&self, b0: f64, b1: f64, strips: &[usize]) -> (usize, f64) {
+        let u = (b1 - b0) / self.twice;
+        let uses = strips.iter().map(|&index| {
+            let strip = &self.strips[index];
+            (index, (strip.p * u + strip.r * b0).abs())
+        });
+        uses.fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most })
+    }
+
+    fn is_straight(&self) -> bool {
+        self.second == [0.0; 3]
+    }
+
+    /// The time over the cell from b0 to b1, s; infinite from rest to rest where it cannot have a peak.
+    pub(super) fn time(&self, b0: f64, b1: f64) -> f64 {
+        let length = 0.5 * self.twice;
+        let over = |length: f64, a: f64, b: f64| 2.0 * length / (a.sqrt() + b.sqrt());
+        match self.run(b0, b1) {
+            Run::Even => over(length, b0, b1),
+            Run::Peak { b, up, down } => {
+                over(up, b0, b) + (length - up - down) / b.sqrt() + over(down, b, b1)
+            }
+        }
+    }
+
+    /// The phases over the cell from b0 to b1, and what limits them.
+    pub(super) fn phases(&self, cell: &Cell, b0: f64, b1: f64, phases: &mut Vec<Phase>, limiting: &mut Limiting) {
+        let mut start = cell.start;
+        let mut push = |length: f64, from: f64, to: f64| {
+            if length > 0.0 && from + to > 0.0 {
+                let (slow, fast) = (from.sqrt(), to.sqrt());
+                let duration = 2.0 * length / (slow + fast);
+                let acceleration = (fast - slow) / duration;
+                phases.push(Phase { piece: cell.piece, start, speed: slow, acceleration, duration });
+                self.limit(from, to, duration, limiting);
+            }
+            start += length;
+        };
+        match self.run(b0, b1) {
+            Run::Even => push(cell.length, b0, b1),
+            Run::Peak { b, up, down } => {
+                push(up, b0, b);
+                push(cell.length - up - down, b, b);
+                push(down, b, b1);
+            }
+        }
+    }
+
+    /// An even ramp; or up to a peak and down again where the motors move in proportion to the parameter, so that one
+    /// acceleration holds over all of the cell, and where it begins and ends at rest.
+    fn run(&self, b0: f64, b1: f64) -> Run {
+        if !self.is_straight() && b0 + b1 > 0.0 {
+            return Run::Even;
+        }
+        // Up to `b` and down again with |u| <= (1 - second * b) / first: (2 b - b0 - b1) first <= twice (1 - second b).
+        let mut b = self.cap;
+        for (first, second) in self.first.iter().zip(self.second) {
+            b = b.min((self.twice + first * (b0 + b1)) / (2.0 * first + self.twice * second));
+        }
+        let strongest = self.first.iter().zip(self.second).map(|(first, second)| (1.0 - second * b) / first);
+        let u = strongest.fold(f64::INFINITY, f64::min);
+        let length = 0.5 * self.twice;
+        let (up, down) = ((b - b0) / (2.0 * u), (b - b1) / (2.0 * u));
+        if b > b0.max(b1) && u > 0.0 && up + down <= length * (1.0 + 1e-9) {
+            let up = up.min(length);
+            Run::Peak { b, up, down: down.min(length - up) }
+        } else {
+            Run::Even
+        }
+    }
+
+    /// Books the time of a ramp to what is nearest to its limit.
+    fn limit(&self, b0: f64, b1: f64, duration: f64, limiting: &mut Limiting) {
+        let (strip, most) = self.use_of(b0, b1, &[0, 1, 2, 3, 4, 5, 6, 7]);
+        if b0.max(b1) / self.cap >= most {
+            match self.capped_by {
+                Cap::Pen => limiting.pen += duration,
+                Cap::Rows => limiting.rows += duration,
+                Cap::Motor(k) => limiting.speed[k] += duration,
+            }
+        } else if strip >= 6 {
+            limiting.rows += duration;
+        } else {
+            // m' u + m'' b = (P - 2 f length R) u + R b, by the share f at which the strip was taken.
+            let (k, share) = (strip / 3, 0.5 * (strip % 3) as f64);
+            let Strip { p, r } = self.strips[strip];
+            let u = (b1 - b0) / self.twice;
+            let along = (p - share * self.twice * r) * u;
+            let turning = r * (b0 + share * (b1 - b0));
+            let of = if turning.abs() > along.abs() { &mut limiting.turning } else { &mut limiting.acceleration };
+            of[k] += duration;
+        }
+    }
+}
