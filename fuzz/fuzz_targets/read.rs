@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
     assert!(!reading.pages.is_empty());
     for stroke in reading.pages.iter().flat_map(|page| &page.drawing.strokes) {
         assert!(stroke.pen.0 > 0);
-        assert!(stroke.source.end <= bytes.len());
+        assert!(stroke.source().end <= bytes.len());
         assert!(stroke.vertices().iter().all(|point| point.x.is_finite() && point.y.is_finite()));
     }
 });

@@ -9,11 +9,13 @@
 
 mod arc;
 mod clip;
+mod lattice;
 mod segment;
 mod stroke;
 
 pub use arc::EllipticArc;
 pub use clip::clip_segment;
 pub use kurbo::{Affine, CubicBez, Line, Point, Rect, Vec2};
+pub use lattice::Pitch;
 pub use segment::Segment;
 pub use stroke::{Drawing, Pen, Span, Stroke};

@@ -1,7 +1,7 @@
 //! Properties of the geometry: affine maps, reversal, flattening, clipping.
 
 use drawing::{
-    Affine, CubicBez, EllipticArc, Line, Pen, Point, Rect, Segment, Span, Stroke, Vec2, clip_segment,
+    Affine, CubicBez, EllipticArc, Line, Pen, Pitch, Point, Rect, Segment, Span, Stroke, Vec2, clip_segment,
 };
 use proptest::prelude::*;
 
@@ -53,6 +53,36 @@ proptest! {
         let g = (s.derivatives(t + h).0 - s.derivatives(t - h).0) / (2.0 * h);
         prop_assert!((f - first).hypot2().sqrt() < 1e-3 * (1.0 + first.hypot2().sqrt()));
         prop_assert!((g - second).hypot2().sqrt() < 1e-3 * (1.0 + second.hypot2().sqrt()));
+    }
+
+    #[test]
+    fn strokes_on_a_lattice_are_like_any_others(
+        cells in proptest::collection::vec((-300..300i32, -40_000..40_000i32), 1..6),
+        more in segment(),
+        m in map(),
+    ) {
+        let points: Vec<Point> =
+            cells.iter().map(|&(x, y)| Point::new(0.025 * f64::from(x), 0.025 * f64::from(y))).collect();
+        let source = Span { start: 3, end: 9 };
+        let lattice = Stroke::on_lattice(Pen(2), &points, source, Pitch::from_mm(0.025).unwrap()).unwrap();
+        let plain = Stroke::polyline(Pen(2), points, source).unwrap();
+        let alike = |change: &dyn Fn(&mut Stroke)| -> Result<(), TestCaseError> {
+            let (mut one, mut other) = (lattice.clone(), plain.clone());
+            change(&mut one);
+            change(&mut other);
+            prop_assert_eq!(&one, &other);
+            prop_assert_eq!(one.vertices(), other.vertices());
+            prop_assert_eq!(one.segments().collect::<Vec<_>>(), other.segments().collect::<Vec<_>>());
+            prop_assert_eq!((one.start(), one.end()), (other.start(), other.end()));
+            prop_assert_eq!(one.segment_count(), other.segment_count());
+            prop_assert_eq!((one.is_dot(), one.is_closed()), (other.is_dot(), other.is_closed()));
+            prop_assert_eq!(one.source(), source);
+            Ok(())
+        };
+        alike(&|_| {})?;
+        alike(&Stroke::reverse)?;
+        alike(&|stroke| stroke.transform(m))?;
+        alike(&|stroke| stroke.push(more))?;
     }
 
     #[test]

@@ -40,7 +40,7 @@ fn check(bytes: &[u8]) -> hpgl::Reading {
     assert!(!reading.pages.is_empty());
     for stroke in reading.pages.iter().flat_map(|page| &page.drawing.strokes) {
         assert!(stroke.pen.0 > 0);
-        assert!(stroke.source.start < stroke.source.end && stroke.source.end <= bytes.len());
+        assert!(stroke.source().start < stroke.source().end && stroke.source().end <= bytes.len());
         assert!(stroke.vertices().iter().all(|p| p.x.is_finite() && p.y.is_finite()));
     }
     for diagnostic in &reading.diagnostics {

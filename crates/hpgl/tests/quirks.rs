@@ -506,7 +506,7 @@ fn places_of_findings() {
 fn strokes_know_their_bytes() {
     let file = b"IN;SP1;PU0,0;PD400,0;PA400,400;PU;";
     let reading = reading(file);
-    let source = reading.pages[0].drawing.strokes[0].source;
+    let source = reading.pages[0].drawing.strokes[0].source();
     assert_eq!(&file[source.start..source.end], b"PD400,0;PA400,400;");
 }
 

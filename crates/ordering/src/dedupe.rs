@@ -42,7 +42,7 @@ pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
     let dot = |p: Point| square(Point::new(p.x + 0.25e-6, p.y + 0.25e-6));
     let lines = strokes.iter().filter(|stroke| !stroke.is_dot());
     let mut inked: Vec<([i64; 2], usize)> =
-        lines.flat_map(Stroke::vertices).map(|&vertex| (dot(vertex), 0)).collect();
+        lines.flat_map(Stroke::points).map(|vertex| (dot(vertex), 0)).collect();
     inked.extend(
         strokes.iter().enumerate().filter(|(_, s)| s.is_dot()).map(|(at, s)| (dot(s.start()), at + 1)),
     );

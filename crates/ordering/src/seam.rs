@@ -59,7 +59,7 @@ fn begin_at(stroke: &mut Stroke, vertex: usize) {
     if vertex == 0 {
         return;
     }
-    let mut turned = Stroke::new(stroke.pen, stroke.vertices()[vertex], stroke.source);
+    let mut turned = Stroke::new(stroke.pen, stroke.vertices()[vertex], stroke.source());
     stroke.segments().skip(vertex).for_each(|segment| turned.push(segment));
     stroke.segments().take(vertex).for_each(|segment| turned.push(segment));
     *stroke = turned;

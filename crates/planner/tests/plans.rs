@@ -240,7 +240,7 @@ fn a_sharp_corner_at_a_long_period_is_not_cut() {
     let drawn =
         rows.windows(2).filter(|pair| pair[0].row.pen > 0).flat_map(|pair| [pair[0].exact, pair[1].exact]);
     let ink: Vec<Point> = drawn.map(|exact| machine.pen_at(&Joints::from(exact))).collect();
-    for vertex in placed.strokes[0].vertices() {
+    for vertex in placed.strokes[0].vertices().iter() {
         assert!(to_polyline(*vertex, &ink) <= 0.1, "{vertex} is missed by {}", to_polyline(*vertex, &ink));
     }
 }

@@ -115,7 +115,7 @@ impl Interpreter {
             chords_by_deviation: false,
             position: Point::ZERO,
             position_mm,
-            tracer: Tracer::new(pieces as f64),
+            tracer: Tracer::new(pieces as f64, options.plotter_unit_mm, length),
             polygon: Polygon::default(),
             fill: FillType::default(),
             line_type: LineType::default(),

@@ -1,8 +1,11 @@
 //! The pen on the paper: joins pen-down movement to strokes, clipped to the window; mm.
 
-use drawing::{Line, Pen, Point, Rect, Segment, Span, Stroke, clip_segment};
+use drawing::{Line, Pen, Pitch, Point, Rect, Segment, Span, Stroke, clip_segment};
 
 use super::line_type::{Dash, Dashes};
+
+/// A stroke takes at least so many bytes of its file, as a rule: `PU100,100;PD100,100;`.
+const BYTES_A_STROKE: usize = 20;
 
 /// Steps shorter than this (mm) are rounding, not movement.
 const NO_STEP: f64 = 1e-9;
@@ -15,6 +18,8 @@ fn same(a: Point, b: Point) -> bool {
 #[derive(Clone, Debug)]
 pub(crate) struct Tracer {
     pub(crate) strokes: Vec<Stroke>,
+    /// The plotter unit, by which nearly all points lie.
+    pitch: Option<Pitch>,
     /// The pen in use.
     pen: Pen,
     /// The command at work.
@@ -37,10 +42,12 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
-    /// With so many dashes at the most.
-    pub(crate) fn new(dashes_left: f64) -> Self {
+    /// With so many dashes at the most, for a plotter with that unit (mm) and a file of that many bytes.
+    pub(crate) fn new(dashes_left: f64, unit_mm: f64, file_bytes: usize) -> Self {
         Self {
-            strokes: Vec::new(),
+            // Room for the strokes of most files, which takes no memory before it is used: a list that grows does.
+            strokes: Vec::with_capacity(file_bytes / BYTES_A_STROKE),
+            pitch: Pitch::from_mm(unit_mm),
             pen: Pen(1),
             command: Span::default(),
             points: Vec::new(),
@@ -255,11 +262,16 @@ impl Tracer {
     #[inline]
     pub(crate) fn finish(&mut self) {
         if let Some(mut stroke) = self.curved.take() {
-            stroke.source = self.source;
+            stroke.set_source(self.source);
+            stroke.shrink_to_fit();
             self.strokes.push(stroke);
         } else if self.points.len() > 1 || (self.dot && !self.points.is_empty()) {
-            // An exact copy, so that strokes hold no spare memory; the scratch list is used again.
-            self.strokes.extend(Stroke::polyline(self.pen, self.points.as_slice().to_vec(), self.source));
+            // A copy, so that strokes hold no spare memory; the scratch list is used again.
+            let stroke = match self.pitch {
+                Some(pitch) => Stroke::on_lattice(self.pen, &self.points, self.source, pitch),
+                None => Stroke::polyline(self.pen, self.points.clone(), self.source),
+            };
+            self.strokes.extend(stroke);
         }
         self.points.clear();
         self.dot = false;

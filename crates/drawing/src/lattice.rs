@@ -1,0 +1,238 @@
+//! Polylines on a lattice, in few bytes.
+//!
+//! Plotters count in whole units, so that nearly every point of nearly every drawing is a multiple of one length, and the next
+//! point is near. Such a polyline is kept as its first point and steps of one or two bytes a coordinate: 2 to 4 bytes a vertex
+//! where two `f64` take 16. Nothing is lost: a polyline whose points do not come back bit by bit is not kept this way.
+
+use kurbo::Point;
+use std::num::NonZeroU32;
+
+/// The spacing of a lattice: a whole number of picometres up to 4.29 mm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pitch(NonZeroU32);
+
+const PICOMETRES_A_MM: f64 = 1e9;
+
+impl Pitch {
+    /// The spacing of that many mm; nothing if it is not a whole number of picometres, or none up to 2^32.
+    pub fn from_mm(mm: f64) -> Option<Self> {
+        let pitch = Self(NonZeroU32::new((mm * PICOMETRES_A_MM).round() as u32)?);
+        (pitch.mm() == mm).then_some(pitch)
+    }
+
+    /// The spacing, mm. Both numbers are whole, so that the quotient is the f64 nearest to the decimal number.
+    fn mm(self) -> f64 {
+        f64::from(self.0.get()) / PICOMETRES_A_MM
+    }
+}
+
+/// Adding this leaves a number rounded to a whole one (ties to even) in the lowest bits of the sum: 1.5 * 2^52.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// The lattice's point nearest to a coordinate; anything for one that is not within 2^31 steps.
+#[inline]
+fn nearest(coordinate: f64, per_mm: f64) -> i32 {
+    (coordinate * per_mm + ROUND).to_bits() as i32
+}
+
+/// What the bytes of [`Steps`] are: bytes of a coordinate's step, the pitch, the first point, then the steps.
+const PITCH: usize = 1;
+const START: usize = PITCH + 4;
+const STEPS: usize = START + 8;
+
+/// Two points on a lattice.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair {
+    pitch: Pitch,
+    ends: [[i32; 2]; 2],
+}
+
+/// Any number of points on a lattice. The pitch is among the bytes: beside them it would make every stroke larger.
+#[derive(Clone, Debug)]
+pub(crate) struct Steps {
+    code: Box<[u8]>,
+}
+
+/// Points in whichever form they fit.
+pub(crate) enum Fitted {
+    Pair(Pair),
+    Steps(Steps),
+}
+
+/// The form in which the points lie on the lattice; nothing if they do not, or if a step is too long.
+pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Fitted> {
+    let (mm, per_mm) = (pitch.mm(), PICOMETRES_A_MM / f64::from(pitch.0.get()));
+    let cell = |p: Point| [nearest(p.x, per_mm), nearest(p.y, per_mm)];
+    let lies_on = |p: Point, [x, y]: [i32; 2]| mm * f64::from(x) == p.x && mm * f64::from(y) == p.y;
+    let first = cell(*points.first()?);
+    let mut at = first;
+    let mut exact = true;
+    let mut longest = 0;
+    for &point in points {
+        let next = cell(point);
+        exact &= lies_on(point, next);
+        longest |= size(next[0].wrapping_sub(at[0])) | size(next[1].wrapping_sub(at[1]));
+        at = next;
+    }
+    if !exact {
+        return None;
+    }
+    if points.len() == 2 {
+        return Some(Fitted::Pair(Pair { pitch, ends: [first, at] }));
+    }
+    // A difference that wraps around is not that of the points, but it leads from one to the other all the same.
+    let width: u8 = match longest {
+        0..=0x7f => 1,
+        0x80..=0x7fff => 2,
+        _ => return None,
+    };
+    let mut code = Vec::with_capacity(STEPS + 2 * usize::from(width) * (points.len() - 1));
+    code.push(width);
+    code.extend(pitch.0.get().to_le_bytes());
+    code.extend(first[0].to_le_bytes());
+    code.extend(first[1].to_le_bytes());
+    at = first;
+    for &point in &points[1..] {
+        let next = cell(point);
+        let (dx, dy) = (next[0].wrapping_sub(at[0]), next[1].wrapping_sub(at[1]));
+        if width == 1 {
+            code.extend([dx as u8, dy as u8]);
+        } else {
+            let ([a, b], [c, d]) = ((dx as i16).to_le_bytes(), (dy as i16).to_le_bytes());
+            code.extend([a, b, c, d]);
+        }
+        at = next;
+    }
+    Some(Fitted::Steps(Steps { code: code.into_boxed_slice() }))
+}
+
+/// A number with the bits that a step needs: its own, or those of its complement where it is negative.
+fn size(step: i32) -> u32 {
+    (step ^ (step >> 31)) as u32
+}
+
+impl Pair {
+    pub(crate) fn points(&self) -> [Point; 2] {
+        let mm = self.pitch.mm();
+        self.ends.map(|[x, y]| Point::new(mm * f64::from(x), mm * f64::from(y)))
+    }
+}
+
+impl Steps {
+    /// How many points there are.
+    pub(crate) fn len(&self) -> usize {
+        1 + (self.code.len() - STEPS) / self.bytes_a_step()
+    }
+
+    fn bytes_a_step(&self) -> usize {
+        2 * usize::from(self.code[0])
+    }
+
+    fn word(&self, at: usize) -> [u8; 4] {
+        std::array::from_fn(|k| self.code[at + k])
+    }
+
+    fn pitch_mm(&self) -> f64 {
+        f64::from(u32::from_le_bytes(self.word(PITCH))) / PICOMETRES_A_MM
+    }
+
+    fn first(&self) -> [i32; 2] {
+        [START, START + 4].map(|at| i32::from_le_bytes(self.word(at)))
+    }
+
+    pub(crate) fn start(&self) -> Point {
+        let ([x, y], mm) = (self.first(), self.pitch_mm());
+        Point::new(mm * f64::from(x), mm * f64::from(y))
+    }
+
+    pub(crate) fn points(&self) -> Walk<'_> {
+        let steps = self.code[STEPS..].chunks_exact(self.bytes_a_step());
+        Walk { mm: self.pitch_mm(), at: Some(self.first()), steps }
+    }
+}
+
+/// The points of [`Steps`], one after the other.
+#[derive(Clone, Debug)]
+pub(crate) struct Walk<'a> {
+    mm: f64,
+    at: Option<[i32; 2]>,
+    steps: std::slice::ChunksExact<'a, u8>,
+}
+
+impl Iterator for Walk<'_> {
+    type Item = Point;
+
+    #[inline]
+    fn next(&mut self) -> Option<Point> {
+        let [x, y] = self.at?;
+        let signed = |byte: u8| i32::from(byte as i8);
+        self.at = self.steps.next().map(|step| match *step {
+            [dx, dy] => [x.wrapping_add(signed(dx)), y.wrapping_add(signed(dy))],
+            [a, b, c, d] => [
+                x.wrapping_add(i32::from(i16::from_le_bytes([a, b]))),
+                y.wrapping_add(i32::from(i16::from_le_bytes([c, d]))),
+            ],
+            _ => [x, y],
+        });
+        Some(Point::new(self.mm * f64::from(x), self.mm * f64::from(y)))
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = usize::from(self.at.is_some()) + self.steps.len();
+        (left, Some(left))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn back(points: &[Point], pitch: Pitch) -> Option<Vec<Point>> {
+        fit(points, pitch).map(|fitted| match fitted {
+            Fitted::Pair(pair) => pair.points().to_vec(),
+            Fitted::Steps(steps) => {
+                assert_eq!(steps.len(), points.len());
+                steps.points().collect()
+            }
+        })
+    }
+
+    fn on(pitch: f64, cells: &[(i32, i32)]) -> Vec<Point> {
+        cells.iter().map(|&(x, y)| Point::new(pitch * f64::from(x), pitch * f64::from(y))).collect()
+    }
+
+    #[test]
+    fn points_come_back_bit_by_bit() {
+        for mm in [0.025, 0.024_88] {
+            let pitch = Pitch::from_mm(mm).unwrap();
+            for cells in [
+                &[(7, -3)][..],
+                &[(0, 0), (i32::MAX, i32::MIN)],
+                &[(10_364, 7961), (10_365, 7962), (10_300, 7900), (10_237, 7834)],
+                &[(-5, 5), (-133, 132), (-5, 5)],
+                &[(0, 0), (32_767, -32_768), (-1, -1)],
+                &[(0, 0), (127, -128), (0, 0)],
+                &[(0, 0), (128, 0), (0, -129)],
+            ] {
+                let points = on(mm, cells);
+                assert_eq!(back(&points, pitch).as_deref(), Some(&points[..]), "{cells:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let pitch = Pitch::from_mm(0.025).unwrap();
+        assert!(fit(&[], pitch).is_none());
+        assert!(back(&[Point::new(0.01, 0.0)], pitch).is_none());
+        assert!(back(&[Point::new(0.025, f64::NAN)], pitch).is_none());
+        assert!(back(&[Point::new(0.025, f64::INFINITY)], pitch).is_none());
+        assert!(back(&[Point::new(0.025 * 4_294_967_296.0, 0.0)], pitch).is_none());
+        assert!(back(&on(0.025, &[(0, 0), (32_768, 0), (0, 0)]), pitch).is_none());
+        assert!(Pitch::from_mm(0.0).is_none());
+        assert!(Pitch::from_mm(-0.025).is_none());
+        assert!(Pitch::from_mm(1e-10).is_none());
+        assert!(Pitch::from_mm(1.0 / 3.0).is_none());
+        assert!(Pitch::from_mm(5.0).is_none());
+    }
+}
