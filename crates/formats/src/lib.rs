@@ -8,6 +8,15 @@
 //! | [`ticks`] | tick lines, for any serial sender (the default) | header, rows | table |
 //! | [`csv`] | comma-separated values, for every other tool | header, rows | table |
 //! | [`json`] | plan document, with machine, settings and certificate | document, header, rows (replayed) | document, table |
+//! | [`coaxial_commands`] | seed 1's command file, in ticks or inches | instants | - |
+//! | [`xy_serial`] | seed 2's serial lines | instants | - |
+//! | [`polar_csv`], [`c_arrays`] | seed 4's table and its program's arrays | instants | - |
+//! | [`ebb`] | an `EiBotBoard`'s `LT` or `SM` moves | rows | - |
+//! | [`gcode`] | G-code of grbl, `FluidNC`, Marlin, Klipper | drawing, or instants | - |
+//! | [`klipper_steps`] | Klipper's `queue_step` | rows | - |
+//! | [`joint_trajectory`] | ROS `JointTrajectory` | instants | - |
+//! | [`halstreamer`] | `LinuxCNC`'s streamer columns | instants | - |
+//! | [`pvt`] | position, velocity, time | instants | - |
 //! | [`svg`] | a drawing as understood | drawing | - |
 //! | [`preview`], [`png`] | a picture of a drawing or a plan on its machine | scene | - |
 //!
@@ -33,19 +42,32 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod c_arrays;
+pub mod coaxial_commands;
+mod command;
 pub mod csv;
+pub mod ebb;
 mod error;
+pub mod gcode;
+pub mod halstreamer;
 mod header;
+pub mod joint_trajectory;
 pub mod json;
+pub mod klipper_steps;
 mod palette;
 pub mod png;
+pub mod polar_csv;
+mod polar_points;
 pub mod preview;
+pub mod pvt;
 mod sniff;
 pub mod svg;
 mod text;
 pub mod ticks;
+pub mod xy_serial;
 
-pub use error::{HeaderError, ReadError, RowsError, WriteError};
+pub use command::{Command, Instant};
+pub use error::{HeaderError, ReadError, RowsError, Unfit, WriteError};
 pub use header::check_header;
 pub use preview::{Ink, Scene};
 pub use sniff::{PlanFile, PlanFormat, looks_like_plan, read_plan};

@@ -55,12 +55,34 @@ pub(crate) struct Convert {
     #[arg(long)]
     pub(crate) hpgl2: bool,
     #[command(flatten)]
+    pub(crate) pen: PenLift,
+    #[command(flatten)]
     pub(crate) planning: Planning,
     #[command(flatten)]
     pub(crate) reading: Reading,
     /// How to report on standard error
     #[arg(long, value_enum, default_value_t = ReportForm::Text)]
     pub(crate) report: ReportForm,
+}
+
+/// How firmware formats move the pen.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct PenLift {
+    /// For G-code: what moves the pen. For ebb: `servo` takes S2 instead of SP
+    #[arg(long, value_name = "HOW", value_enum)]
+    pub(crate) pen_by: Option<PenBy>,
+    /// Positions with the pen up and down: S or degrees of a servo, mm of Z, twelfths of a microsecond for ebb
+    #[arg(long, value_name = "UP,DOWN", value_parser = positions, allow_hyphen_values = true)]
+    pub(crate) pen_positions: Option<(i16, i16)>,
+}
+
+/// What moves the pen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PenBy {
+    /// A servo
+    Servo,
+    /// The Z axis
+    Z,
 }
 
 /// How a drawing's file is read.
@@ -235,6 +257,38 @@ pub(crate) enum Format {
     Csv,
     /// A plan document with machine, settings and certificate
     Json,
+    /// The coaxial arm's command file, in ticks
+    CoaxialCommands,
+    /// The coaxial arm's command file, in inches
+    CoaxialCommandsInches,
+    /// Serial lines of the single-belt plotter
+    XySerial,
+    /// The polar robot's table; one stroke
+    PolarCsv,
+    /// The polar robot's points as C arrays; one stroke
+    CArrays,
+    /// EiBotBoard, firmware 2.7 and later
+    Ebb,
+    /// EiBotBoard, older firmware
+    EbbSm,
+    /// G-code for grbl, with arcs
+    GcodeGrbl,
+    /// G-code for FluidNC, with arcs
+    GcodeFluidnc,
+    /// G-code for Marlin, with arcs
+    GcodeMarlin,
+    /// G-code for Klipper, with arcs
+    GcodeKlipper,
+    /// G-code of the plan's rows with their times (G93), for grbl, FluidNC and LinuxCNC
+    GcodeTimed,
+    /// Klipper's step commands
+    KlipperSteps,
+    /// ROS JointTrajectory, as JSON
+    JointTrajectory,
+    /// Columns for LinuxCNC's halstreamer
+    Halstreamer,
+    /// Position, velocity and time of each motor
+    Pvt,
     /// The drawing as understood, as clean HP-GL
     Hpgl,
     /// The drawing as understood, as SVG in mm
@@ -268,6 +322,12 @@ pub(crate) enum Speed {
 
 fn length(text: &str) -> Result<f64, String> {
     quantity::length_mm(text, true).map_err(|error| error.to_string())
+}
+
+fn positions(text: &str) -> Result<(i16, i16), String> {
+    let (up, down) = text.split_once(',').ok_or("two whole numbers with a comma between, such as 40,90")?;
+    let number = |text: &str| text.trim().parse().map_err(|_| format!("{text} is not a whole number"));
+    Ok((number(up)?, number(down)?))
 }
 
 fn time(text: &str) -> Result<f64, String> {

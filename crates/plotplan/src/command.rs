@@ -2,6 +2,7 @@
 
 mod check;
 mod convert;
+mod firmware;
 mod info;
 mod machine;
 mod motion;

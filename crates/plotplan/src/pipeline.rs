@@ -66,6 +66,8 @@ pub struct Compiled<'a> {
     pub placement: Affine,
     /// The drawing where it lies on the machine, in the file's order; machine mm.
     pub placed: Drawing,
+    /// The same in the order in which it is drawn.
+    pub ordered: Drawing,
     /// How far ink reaches beyond the sheet, mm.
     pub beyond_sheet_mm: f64,
     /// What ordering brought, where it was asked for.
@@ -158,7 +160,17 @@ pub fn compile<'a>(
             (row.row, Some(row.exact))
         })
     });
-    Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
+    Ok(Compiled {
+        trajectory,
+        header,
+        placement,
+        placed,
+        ordered,
+        beyond_sheet_mm,
+        ordering,
+        strokes,
+        certificate,
+    })
 }
 
 /// Whether two drawings consist of exactly the same pieces, in whatever order and direction, with the same pens.

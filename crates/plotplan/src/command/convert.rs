@@ -91,6 +91,11 @@ fn plan(
         terminal::say(&said);
         return Err(Failure::Refused);
     }
+    if super::firmware::is_for(arguments.format) {
+        super::firmware::write(arguments, &machine.machine, &compiled)?;
+        terminal::say(&said);
+        return Ok(());
+    }
     let rows = || compiled.trajectory.rows().map(|row| row.row);
     output::write(&arguments.output, |out| {
         let written = match arguments.format {
