@@ -17,16 +17,26 @@ enum Kind {
     End,
 }
 
-fn kind(byte: u8) -> Kind {
-    match byte {
-        63..=126 | 191..=254 => Kind::Digit,
-        27 => Kind::End,
-        0..=32 | 127..=160 => Kind::Passed,
-        _ => match byte & 0x7f {
-            b':' | b'<' | b'=' | b'>' | b'7' => Kind::Flag,
-            _ => Kind::End,
-        },
+const KINDS: [Kind; 256] = {
+    let mut kinds = [Kind::End; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        kinds[byte] = match byte as u8 {
+            63..=126 | 191..=254 => Kind::Digit,
+            27 => Kind::End,
+            0..=32 | 127..=160 => Kind::Passed,
+            other => match other & 0x7f {
+                b':' | b'<' | b'=' | b'>' | b'7' => Kind::Flag,
+                _ => Kind::End,
+            },
+        };
+        byte += 1;
     }
+    kinds
+};
+
+fn kind(byte: u8) -> Kind {
+    KINDS[usize::from(byte)]
 }
 
 /// The byte that the data hold at `at`, and how many bytes of the file it takes.
@@ -173,7 +183,24 @@ impl<'a> Decoder<'a> {
 impl Iterator for Decoder<'_> {
     type Item = Item;
 
+    #[inline]
     fn next(&mut self) -> Option<Item> {
+        // The everyday number: a small step, in one digit.
+        if let Some(&byte) = self.bytes.get(self.at)
+            && let digit = byte.wrapping_sub(if self.base32 { 95 } else { 191 })
+            && digit < if self.base32 { 32 } else { 64 }
+            && !self.reencoded
+        {
+            self.at += 1;
+            let size = f64::from(digit >> 1) * self.scale;
+            return Some(Item::Coordinate(if digit & 1 == 1 { -size } else { size }));
+        }
+        self.next_item()
+    }
+}
+
+impl Decoder<'_> {
+    fn next_item(&mut self) -> Option<Item> {
         loop {
             let (byte, length) = byte_at(self.bytes, self.at, self.reencoded)?;
             match kind(byte) {

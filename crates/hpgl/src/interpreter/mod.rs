@@ -264,7 +264,14 @@ impl Interpreter {
     }
 
     /// To be called before ink: sees to it that there is a pen, and tells where that is not what the file says.
+    #[inline]
     fn ink(&mut self) {
+        if !(matches!(self.holder, Holder::Holds(_)) && self.pens.are_noted()) {
+            self.find_pen();
+        }
+    }
+
+    fn find_pen(&mut self) {
         match self.holder {
             Holder::Holds(_) => {}
             Holder::Unsaid => {
@@ -292,18 +299,24 @@ impl Interpreter {
     }
 
     /// Whether a point can be meant; if not, it is told.
+    #[inline]
     fn is_sane(&mut self, position: Point) -> bool {
         let sane = position.x.abs() <= crate::units::SANE_PLU && position.y.abs() <= crate::units::SANE_PLU;
         if !sane {
-            let mnemonic = self.mnemonic;
-            self.report(codes::COORDINATE_OUT_OF_RANGE, || {
-                format!(
-                    "`{mnemonic}` leads to ({:.4e}, {:.4e}) plotter units; the point is left out",
-                    position.x, position.y
-                )
-            });
+            self.report_far_point(position);
         }
         sane
+    }
+
+    #[cold]
+    fn report_far_point(&mut self, position: Point) {
+        let mnemonic = self.mnemonic;
+        self.report(codes::COORDINATE_OUT_OF_RANGE, || {
+            format!(
+                "`{mnemonic}` leads to ({:.4e}, {:.4e}) plotter units; the point is left out",
+                position.x, position.y
+            )
+        });
     }
 
     /// Ink that was drawn after `SP0` is none, unless there is no other in the whole file: then a pen in the holder is

@@ -31,6 +31,12 @@ impl Pens {
         std::mem::take(&mut self.used)
     }
 
+    /// Whether nothing has changed since the last ink.
+    #[inline]
+    pub(super) fn are_noted(&self) -> bool {
+        self.noted
+    }
+
     fn note(&mut self, pen: Pen) {
         let now = self.single.get(&pen).copied().unwrap_or(self.all);
         self.used
@@ -67,7 +73,6 @@ impl Pens {
 
 impl Interpreter {
     /// Notes what the pen that draws now was told.
-    #[inline]
     pub(super) fn note_pen(&mut self) {
         if !self.pens.noted
             && let Holder::Holds(pen) = self.holder

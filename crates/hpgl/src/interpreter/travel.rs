@@ -5,7 +5,6 @@ use drawing::{Point, Vec2};
 use super::Interpreter;
 use crate::codes;
 use crate::encoded::{Decoder, Item};
-use crate::units::SANE_PLU;
 
 impl Interpreter {
     pub(super) fn pen_up(&mut self, parameters: &[f64]) {
@@ -21,6 +20,7 @@ impl Interpreter {
         self.travel(parameters);
     }
 
+    #[inline]
     fn lower(&mut self) {
         if !self.down {
             self.down = true;
@@ -65,17 +65,9 @@ impl Interpreter {
             }
             return;
         }
-        self.ink();
         for pair in pairs {
             let to = self.target(self.position, pair[0], pair[1]);
-            if !(to.x.abs() <= SANE_PLU && to.y.abs() <= SANE_PLU) {
-                self.is_sane(to);
-                continue;
-            }
-            let to_mm = self.frame.mm_of_plu(to);
-            self.tracer.line(self.position_mm, to_mm);
-            self.position = to;
-            self.position_mm = to_mm;
+            self.go(to);
         }
     }
 
@@ -90,6 +82,7 @@ impl Interpreter {
     }
 
     /// Goes straight to a place in plotter units with the pen as it is.
+    #[inline]
     pub(super) fn go(&mut self, to: Point) {
         if !self.is_sane(to) {
             return;

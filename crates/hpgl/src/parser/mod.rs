@@ -110,6 +110,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The next command; nothing at the end of the file.
+    #[inline]
     pub(crate) fn next(&mut self) -> Option<Command<'_>> {
         let head = self.head()?;
         Some(Command {
@@ -179,6 +180,7 @@ impl<'a> Parser<'a> {
         self.findings.report(code, mnemonic, span, self.number.max(1), Point::ZERO, message);
     }
 
+    #[inline]
     fn head(&mut self) -> Option<Head> {
         self.parameters.clear();
         if let Some((mnemonic, start)) = self.unfinished.take() {
@@ -209,6 +211,7 @@ impl<'a> Parser<'a> {
     }
 
     /// One step between commands.
+    #[inline]
     fn hpgl(&mut self) -> Step {
         let start = self.at;
         let Some(&byte) = self.bytes.get(start) else { return Step::End };
@@ -251,6 +254,7 @@ impl<'a> Parser<'a> {
     }
 
     /// At a letter: a command, an unknown command, or something that is none.
+    #[inline]
     fn letters(&mut self) -> Option<Head> {
         let start = self.at;
         let first = self.bytes[start];
@@ -403,6 +407,7 @@ impl<'a> Parser<'a> {
     }
 
     /// The rest of a command whose name ends at `at`.
+    #[inline]
     fn command(&mut self, mnemonic: Mnemonic, form: Form, start: usize) -> Option<Head> {
         self.number += 1;
         if matches!(&mnemonic.0, b"IN" | b"DF" | b"BP") {
@@ -418,10 +423,12 @@ impl<'a> Parser<'a> {
         })
     }
 
+    #[inline]
     fn finish(&mut self, mnemonic: Mnemonic, start: usize, text: Span) -> Head {
         Head { mnemonic, span: Span { start, end: self.at }, number: self.number, text }
     }
 
+    #[inline]
     fn textless(&mut self, mnemonic: Mnemonic, start: usize) -> Head {
         let text = Span { start: self.at, end: self.at };
         self.finish(mnemonic, start, text)
@@ -431,35 +438,13 @@ impl<'a> Parser<'a> {
     ///
     /// Interpreters of the time pass over line ends inside numbers, so that files wrapped at a column read; files
     /// written by hand put a pair on each line without a comma. In a coordinate list the count tells which it is.
+    #[inline]
     fn numbers(&mut self, mnemonic: Mnemonic, start: usize) -> Option<Head> {
         let first = self.at;
         let coordinates = matches!(&mnemonic.0, b"PU" | b"PD" | b"PA" | b"PR");
         let joined = self.number_list(mnemonic, false, true);
         if joined.line_ends > 0 {
-            let (count, at) = (self.parameters.len(), self.at);
-            let mut parted = false;
-            if coordinates {
-                self.at = first;
-                self.parameters.clear();
-                let apart = self.number_list(mnemonic, true, false);
-                let apart_even = self.parameters.len().is_multiple_of(2);
-                parted = apart_even && (!count.is_multiple_of(2) || !apart.broke_a_pair);
-                if !parted {
-                    self.at = first;
-                    self.parameters.clear();
-                    self.number_list(mnemonic, false, false);
-                    debug_assert_eq!(self.at, at);
-                }
-            }
-            let span = Span { start, end: self.at };
-            self.report(codes::LINE_END_IN_NUMBER, mnemonic, span, || {
-                let what =
-                    if parted { "they are read as two numbers" } else { "they are read as one number" };
-                (
-                    format!("only a line end stands between digits; {what}"),
-                    Some("put a comma between coordinates".into()),
-                )
-            });
+            self.weigh_line_ends(mnemonic, start, first, coordinates);
         }
         if self.unfinished.is_some() {
             self.unfinished = Some((mnemonic, start));
@@ -473,7 +458,36 @@ impl<'a> Parser<'a> {
         Some(self.textless(mnemonic, start))
     }
 
+    /// Decides what line ends between digits mean in the numbers that were just read from `first` on.
+    #[cold]
+    fn weigh_line_ends(&mut self, mnemonic: Mnemonic, start: usize, first: usize, coordinates: bool) {
+        let (count, at) = (self.parameters.len(), self.at);
+        let mut parted = false;
+        if coordinates {
+            self.at = first;
+            self.parameters.clear();
+            let apart = self.number_list(mnemonic, true, false);
+            let apart_even = self.parameters.len().is_multiple_of(2);
+            parted = apart_even && (!count.is_multiple_of(2) || !apart.broke_a_pair);
+            if !parted {
+                self.at = first;
+                self.parameters.clear();
+                self.number_list(mnemonic, false, false);
+                debug_assert_eq!(self.at, at);
+            }
+        }
+        let span = Span { start, end: self.at };
+        self.report(codes::LINE_END_IN_NUMBER, mnemonic, span, || {
+            let what = if parted { "they are read as two numbers" } else { "they are read as one number" };
+            (
+                format!("only a line end stands between digits; {what}"),
+                Some("put a comma between coordinates".into()),
+            )
+        });
+    }
+
     /// Takes the pairs with a number that is too large out of a coordinate list.
+    #[cold]
     fn drop_overflow(&mut self, mnemonic: Mnemonic, start: usize) {
         let span = Span { start, end: self.at };
         self.report(codes::NUMBER_OUT_OF_RANGE, mnemonic, span, || {
