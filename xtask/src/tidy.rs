@@ -15,7 +15,8 @@ const MAY_KNOW: &[(&str, &[&str])] = &[
     ("planner", &["drawing", "kinematics", "plan"]),
     ("verify", &["drawing", "kinematics", "plan"]),
     ("formats", &["drawing", "plan"]),
-    ("plotplan", &["drawing", "formats", "hpgl", "kinematics", "ordering", "plan", "planner", "verify"]),
+    ("sending", &["drawing", "formats", "plan"]),
+    ("plotplan", &["drawing", "formats", "hpgl", "kinematics", "ordering", "plan", "planner", "sending", "verify"]),
     ("xtask", &["drawing", "formats", "hpgl", "kinematics", "plan", "planner"]),
 ];
 

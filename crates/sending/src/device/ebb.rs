@@ -1,0 +1,259 @@
+//! An `EiBotBoard`: commands one after the other, `OK` once there was room in the FIFO of one move, accumulators as the command
+//! reference has them.
+//!
+//! Every 40 us `Rate += Accel`, `Accumulator += Rate`, and a step when the accumulator reaches 2^31; the initial rate is lowered by
+//! half the acceleration. USB holds back what the board has no room for.
+
+use std::collections::VecDeque;
+
+use super::Device;
+use crate::ink::Ink;
+
+/// Its receive buffer, bytes.
+const BUFFER: usize = 256;
+/// Moves that wait behind the one that is being done.
+const FIFO: usize = 1;
+const INTERVAL_US: u64 = 40;
+const FULL: i64 = 1 << 31;
+
+#[derive(Clone, Copy, Debug)]
+enum Motion {
+    /// So many intervals at these rates and accelerations, accumulators cleared by the bits.
+    Timed { intervals: u64, rates: [i64; 2], accelerations: [i64; 2], clear: u8 },
+    /// So many milliseconds, evenly.
+    Stepper { ms: u64, steps: [i64; 2] },
+    /// The pen, and a wait.
+    Pen { down: bool, ms: u64 },
+}
+
+/// The board with its motors.
+#[derive(Debug, Default)]
+pub struct Ebb {
+    buffer: Vec<u8>,
+    fifo: VecDeque<Motion>,
+    until_us: Option<u64>,
+    answers: Vec<Vec<u8>>,
+    accumulators: [i64; 2],
+    /// Its global step counters, and how far the motors are from where they were switched on.
+    counters: [i64; 2],
+    place: [i64; 2],
+    up_position: Option<i64>,
+    down: bool,
+    ink: Ink,
+    lost: u64,
+    stalled_us: u64,
+    now_us: u64,
+}
+
+impl Ebb {
+    /// Switched on.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    fn ok(&mut self) {
+        self.answers.push(b"OK\r\n".to_vec());
+    }
+
+    /// Each thing at its time, up to `now_us`.
+    fn work(&mut self, now_us: u64) {
+        loop {
+            while self.take() || self.begin() {}
+            let Some(next_us) = self.wake_us().filter(|next_us| *next_us <= now_us) else { break };
+            self.now_us = next_us;
+            if self.until_us == Some(next_us) {
+                self.until_us = None;
+                if let Some(motion) = self.fifo.pop_front() {
+                    self.end(motion);
+                }
+            }
+        }
+        self.now_us = now_us;
+    }
+
+    fn begin(&mut self) -> bool {
+        if self.until_us.is_some() {
+            return false;
+        }
+        let Some(motion) = self.fifo.front().copied() else { return false };
+        let lasts_us = match motion {
+            Motion::Timed { intervals, .. } => intervals * INTERVAL_US,
+            Motion::Stepper { ms, .. } => ms * 1000,
+            Motion::Pen { down, ms } => {
+                self.down = down;
+                self.ink.pen(u16::from(down), self.place.map(|steps| steps as f64));
+                ms * 1000
+            }
+        };
+        self.until_us = Some(self.now_us + lasts_us);
+        true
+    }
+
+    fn end(&mut self, motion: Motion) {
+        let steps = match motion {
+            Motion::Timed { intervals, rates, accelerations, clear } => [0, 1].map(|axis| {
+                if clear & (1 << axis) != 0 {
+                    self.accumulators[axis] = 0;
+                }
+                let (mut rate, acceleration) = (rates[axis].abs(), accelerations[axis]);
+                rate -= acceleration / 2;
+                let mut steps = 0;
+                for _ in 0..intervals {
+                    rate += acceleration;
+                    if rate < 0 {
+                        rate += FULL;
+                    }
+                    self.accumulators[axis] += rate;
+                    if self.accumulators[axis] >= FULL {
+                        self.accumulators[axis] -= FULL;
+                        steps += 1;
+                    }
+                }
+                steps * rates[axis].signum()
+            }),
+            Motion::Stepper { steps, .. } => steps,
+            Motion::Pen { .. } => [0, 0],
+        };
+        for (axis, steps) in steps.into_iter().enumerate() {
+            self.counters[axis] += steps;
+            self.place[axis] += steps;
+        }
+        self.ink.go(self.place.map(|steps| steps as f64));
+    }
+
+    fn take(&mut self) -> bool {
+        if self.now_us < self.stalled_us {
+            return false;
+        }
+        let Some(end) = self.buffer.iter().position(|byte| *byte == b'\r') else { return false };
+        let line = String::from_utf8_lossy(&self.buffer[..end]).trim().to_owned();
+        let motion = match motion(&line, self.up_position) {
+            Ok(motion) => motion,
+            Err(why) => {
+                self.buffer.drain(..=end);
+                if let Some(why) = why {
+                    self.answers.push(format!("!8 Err: {why}\r\n").into_bytes());
+                } else {
+                    self.query(&line);
+                }
+                return true;
+            }
+        };
+        // One is being done, one may wait; another has to wait in the buffer.
+        if self.fifo.len() > FIFO {
+            return false;
+        }
+        self.buffer.drain(..=end);
+        if let (Motion::Pen { .. }, Some(position)) = (motion, servo_position(&line)) {
+            self.up_position.get_or_insert(position);
+        }
+        self.fifo.push_back(motion);
+        self.ok();
+        true
+    }
+
+    fn query(&mut self, line: &str) {
+        match line {
+            "QM" => {
+                let moving = u8::from(!self.fifo.is_empty());
+                self.answers.push(format!("QM,{moving},{moving},{moving},0\r\n").into_bytes());
+            }
+            "QS" => {
+                let [a, b] = self.counters;
+                self.answers.push(format!("{a},{b}\r\n").into_bytes());
+                self.ok();
+            }
+            _ => {
+                if line.starts_with("EM,") {
+                    self.counters = [0, 0];
+                }
+                self.ok();
+            }
+        }
+    }
+}
+
+/// The position of `S2`.
+fn servo_position(line: &str) -> Option<i64> {
+    line.strip_prefix("S2,")?.split(',').next()?.parse().ok()
+}
+
+/// What a line moves; nothing if it is a query or a setting, or why it is wrong.
+fn motion(line: &str, up_position: Option<i64>) -> Result<Motion, Option<String>> {
+    let mut words = line.split(',');
+    let verb = words.next().unwrap_or_default();
+    if matches!(verb, "QM" | "QS" | "EM" | "") {
+        return Err(None);
+    }
+    let wrong = || Some(format!("parameter of {line}"));
+    let numbers: Option<Vec<i64>> = words.map(|word| word.parse().ok()).collect();
+    let numbers = numbers.ok_or_else(wrong)?;
+    let in_range = |rate: i64| rate.abs() < FULL;
+    match (verb, &numbers[..]) {
+        ("LT", [intervals, r1, a1, r2, a2, rest @ ..])
+            if *intervals > 0 && in_range(*r1) && in_range(*r2) && rest.len() < 2 =>
+        {
+            Ok(Motion::Timed {
+                intervals: *intervals as u64,
+                rates: [*r1, *r2],
+                accelerations: [*a1, *a2],
+                clear: rest.first().map_or(0, |clear| *clear as u8),
+            })
+        }
+        ("SM", [ms, a, b]) if (1..=16_777_215).contains(ms) => {
+            Ok(Motion::Stepper { ms: *ms as u64, steps: [*a, *b] })
+        }
+        ("SP", [value, ms]) if *ms >= 0 => Ok(Motion::Pen { down: *value == 0, ms: *ms as u64 }),
+        ("S2", [position, _, _, ms]) if *ms >= 0 => {
+            Ok(Motion::Pen { down: up_position.is_some_and(|up| up != *position), ms: *ms as u64 })
+        }
+        _ => Err(wrong()),
+    }
+}
+
+impl Device for Ebb {
+    fn advance(&mut self, now_us: u64) {
+        self.work(now_us);
+    }
+
+    fn receive(&mut self, bytes: &[u8], now_us: u64) {
+        self.advance(now_us);
+        for &byte in bytes {
+            if self.buffer.len() < BUFFER {
+                self.buffer.push(byte);
+            } else {
+                self.lost += 1;
+            }
+        }
+        self.advance(now_us);
+    }
+
+    fn room(&self) -> usize {
+        BUFFER - self.buffer.len()
+    }
+
+    fn answers(&mut self) -> Vec<Vec<u8>> {
+        std::mem::take(&mut self.answers)
+    }
+
+    fn wake_us(&self) -> Option<u64> {
+        let stalled = (self.stalled_us > self.now_us).then_some(self.stalled_us);
+        self.until_us.into_iter().chain(stalled).min()
+    }
+
+    fn ink(&self) -> &Ink {
+        &self.ink
+    }
+
+    fn lost_bytes(&self) -> u64 {
+        self.lost
+    }
+
+    fn stall(&mut self, until_us: u64) {
+        self.stalled_us = until_us;
+    }
+
+    fn pen_is_down(&self) -> bool {
+        self.down
+    }
+}
