@@ -7,12 +7,14 @@ use std::process::ExitCode;
 mod bench;
 mod corpus;
 mod order;
+mod peers;
 mod tidy;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   tidy          fail when a crate depends on one that it must not know, and on other untidiness
   corpus DIR    run the release binary over every drawing below DIR: no panic, no hang, no plan without a certificate
+  peers [DIR …] read our drawings, and those below DIR, beside hp2xx (skipped where it is not installed): length and distance
   order DIR     plan every drawing below DIR in the file's order and in ours, on two machines: a table of times
   bench order GENERATOR
                 order the drawings that the script GENERATOR makes (python3 with numpy), beside references
@@ -25,6 +27,7 @@ fn main() -> ExitCode {
         ["tidy"] => tidy::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
         ["bench", "order", generator] => order::bench(generator.as_ref()),
+        ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),
         ["order", folder] => order::real(folder.as_ref()),
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),

@@ -1,0 +1,313 @@
+//! `cargo xtask peers`: what we read of drawings beside what hp2xx reads of them, file by file.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result};
+use drawing::Point;
+use rstar::primitives::Line;
+use rstar::{PointDistance as _, RTree};
+
+/// Lengths that differ by more than this need a note.
+const ALIKE: f64 = 0.005;
+/// Shapes further apart than this (mm) are told apart in the summary.
+const NEAR_MM: f64 = 0.05;
+/// hp2xx writes chords of 5 degrees; ours are much nearer to the arcs than theirs.
+const CHORD_MM: f64 = 0.001;
+const PLOTTER_UNIT_MM: f64 = 0.025;
+const LIMIT: Duration = Duration::from_secs(60);
+/// Distances are measured from so many places at the most, evenly along all ink, and from the ends of as many lines.
+const MOST_SAMPLES: f64 = 20_000.0;
+const FINEST_STEP_MM: f64 = 0.02;
+
+const NOTES: &str = include_str!("peers.toml");
+
+type Polylines = Vec<Vec<Point>>;
+
+/// Why a file is read differently, and by whom rightly.
+struct Note {
+    right: String,
+    why: String,
+}
+
+/// One file read twice.
+struct Row {
+    name: String,
+    ours_mm: f64,
+    /// Nothing where hp2xx gives the file up.
+    theirs_mm: Option<f64>,
+    apart_mm: Option<f64>,
+    /// It has text or fills, which no two readers draw alike.
+    text_or_fill: bool,
+}
+
+impl Row {
+    fn alike(&self, part: f64) -> bool {
+        let theirs = self.theirs_mm.unwrap_or(0.0);
+        (self.ours_mm - theirs).abs() <= part * self.ours_mm.max(theirs)
+    }
+}
+
+/// Compares all drawings below the folders, and our own; true if every difference in length has a note.
+pub(crate) fn run(folders: &[PathBuf]) -> Result<bool> {
+    if Command::new("hp2xx").arg("-q").stdin(Stdio::null()).output().is_err() {
+        println!("hp2xx is not installed: nothing to compare with");
+        return Ok(true);
+    }
+    let notes = notes()?;
+    let mut files = Vec::new();
+    let own = ["tests/drawings", "examples"].map(|folder| crate::top().join(folder));
+    for folder in own.iter().chain(folders) {
+        let mut found = Vec::new();
+        crate::corpus::find(folder, &mut found)?;
+        found.sort();
+        files.extend(found);
+    }
+    let work = tempfile::tempdir()?;
+    println!("{:<58} {:>12} {:>12} {:>8} {:>9}", "file", "ours mm", "hp2xx mm", "ratio", "apart mm");
+    let mut rows = Vec::new();
+    let mut unexplained = 0;
+    for file in &files {
+        let row = compare(file, work.path())?;
+        let show = |number: Option<f64>, digits: usize| {
+            number.map_or_else(|| "-".to_owned(), |number| format!("{number:.digits$}"))
+        };
+        println!(
+            "{:<58} {:>12.2} {:>12} {:>8} {:>9}{}",
+            row.name.chars().take(58).collect::<String>(),
+            row.ours_mm,
+            show(row.theirs_mm, 2),
+            show(row.theirs_mm.map(|theirs| row.ours_mm / theirs).filter(|ratio| ratio.is_finite()), 4),
+            show(row.apart_mm, 3),
+            if row.text_or_fill { "  text or fill" } else { "" }
+        );
+        if !row.alike(ALIKE) {
+            let why = notes.get(&row.name);
+            for note in why.into_iter().flatten() {
+                println!("    right: {}. {}", note.right, note.why);
+            }
+            if why.is_none() {
+                println!("    NO NOTE says who is right");
+                unexplained += 1;
+            }
+        }
+        rows.push(row);
+    }
+    summary(&rows);
+    println!("{unexplained} unexplained");
+    Ok(unexplained == 0)
+}
+
+fn summary(rows: &[Row]) {
+    for (title, plain) in [("without text and fills", true), ("with text or fills", false)] {
+        let mine: Vec<&Row> = rows.iter().filter(|row| row.text_or_fill != plain).collect();
+        let count = |holds: &dyn Fn(&Row) -> bool| mine.iter().filter(|row| holds(row)).count();
+        println!(
+            "{} files {title}: {} within 0.1 % in length, {} within 0.5 %, {} of them within {NEAR_MM} mm in shape; hp2xx \
+             gave up {}",
+            mine.len(),
+            count(&|row| row.alike(0.001)),
+            count(&|row| row.alike(ALIKE)),
+            count(&|row| row.alike(ALIKE) && row.apart_mm.is_some_and(|apart| apart <= NEAR_MM)),
+            count(&|row| row.theirs_mm.is_none()),
+        );
+    }
+}
+
+/// The notes of every file: the reasons that peers.toml gives for it.
+fn notes() -> Result<BTreeMap<String, Vec<Note>>> {
+    let table: toml::Table = NOTES.parse().context("peers.toml")?;
+    let part = |name: &str| {
+        table.get(name).and_then(|part| part.as_table()).with_context(|| format!("peers.toml: no {name}"))
+    };
+    let (reasons, files) = (part("reason")?, part("files")?);
+    let note = |name: &toml::Value| {
+        let reason = name.as_str().and_then(|name| reasons.get(name));
+        let word = |key: &str| reason.and_then(|reason| reason.get(key)?.as_str()).map(str::to_owned);
+        let (Some(right), Some(why)) = (word("right"), word("why")) else {
+            anyhow::bail!("peers.toml: no reason {name}");
+        };
+        Ok(Note { right, why })
+    };
+    let of_file = |(file, names): (&String, &toml::Value)| {
+        let names = names.as_array().with_context(|| format!("peers.toml: {file} has no list"))?;
+        Ok((file.clone(), names.iter().map(note).collect::<Result<_>>()?))
+    };
+    files.iter().map(of_file).collect()
+}
+
+fn compare(file: &Path, work: &Path) -> Result<Row> {
+    let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let reading = hpgl::read(&bytes, &hpgl::Options::default());
+    // hp2xx draws all pages on one.
+    let strokes = reading.pages.iter().flat_map(|page| &page.drawing.strokes);
+    let mut ours: Polylines = strokes.map(|stroke| stroke.flatten(CHORD_MM)).collect();
+    let theirs = hp2xx(file, work)?.map(|text| polylines(&text));
+    let is_finite = |lines: &Polylines| lines.iter().flatten().all(|p| p.x.is_finite() && p.y.is_finite());
+    let theirs = theirs.filter(|lines| !lines.is_empty() && is_finite(lines));
+    let used = |name: &[u8; 2]| reading.summary.used.iter().any(|(mnemonic, _)| mnemonic.0 == *name);
+    let text_or_fill = [b"LB", b"PB", b"SM", b"FP", b"RA", b"RR", b"WG", b"UC"].into_iter().any(used);
+    let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let ours_mm = length(&ours);
+    let mut row = Row { name, ours_mm, theirs_mm: None, apart_mm: None, text_or_fill };
+    if let Some(mut theirs) = theirs {
+        row.theirs_mm = Some(length(&theirs));
+        to_origin(&mut ours);
+        to_origin(&mut theirs);
+        row.apart_mm = distance(&ours, &theirs);
+    }
+    Ok(row)
+}
+
+/// What hp2xx makes of a file, as HP-GL in plotter units at its true size; nothing where it fails.
+fn hp2xx(file: &Path, work: &Path) -> Result<Option<String>> {
+    let output = work.join("hp2xx.hpgl");
+    let _ = std::fs::remove_file(&output);
+    let mut child = Command::new("hp2xx")
+        .args(["-q", "-t", "-m", "hpgl", "-f"])
+        .args([output.as_os_str(), file.canonicalize()?.as_os_str()])
+        .current_dir(work)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .context("cannot start hp2xx")?;
+    let began = Instant::now();
+    let done = loop {
+        if let Some(status) = child.try_wait()? {
+            break status.success();
+        }
+        if began.elapsed() > LIMIT {
+            child.kill()?;
+            child.wait()?;
+            break false;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    Ok(std::fs::read(&output).ok().filter(|_| done).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
+}
+
+/// The polylines in what hp2xx writes: `PUx,y;PDx,y;...`, absolute.
+fn polylines(text: &str) -> Polylines {
+    let mut lines: Polylines = Vec::new();
+    let mut at: Option<Point> = None;
+    let mut drawing = false;
+    for command in text.split(';') {
+        let Some((name, rest)) = command.trim().split_at_checked(2) else { continue };
+        let mut numbers = rest.split(',').map_while(|number| number.trim().parse::<f64>().ok());
+        let (Some(x), Some(y)) = (numbers.next(), numbers.next()) else {
+            drawing &= name == "PD";
+            continue;
+        };
+        let to = Point::new(x * PLOTTER_UNIT_MM, y * PLOTTER_UNIT_MM);
+        match (name, at) {
+            ("PD", Some(from)) => {
+                if !drawing {
+                    lines.push(vec![from]);
+                }
+                if let Some(line) = lines.last_mut() {
+                    line.push(to);
+                }
+                drawing = true;
+            }
+            _ => drawing = false,
+        }
+        at = Some(to);
+    }
+    lines
+}
+
+fn length(lines: &[Vec<Point>]) -> f64 {
+    lines.iter().flat_map(|line| line.windows(2)).map(|pair| (pair[1] - pair[0]).hypot()).sum()
+}
+
+/// Moves the lower left corner of the bounds to the origin: hp2xx does not keep it where it is.
+fn to_origin(lines: &mut Polylines) {
+    let points = || lines.iter().flatten();
+    let x = points().map(|p| p.x).fold(f64::INFINITY, f64::min);
+    let y = points().map(|p| p.y).fold(f64::INFINITY, f64::min);
+    for point in lines.iter_mut().flatten() {
+        *point -= drawing::Vec2::new(x, y);
+    }
+}
+
+/// The Hausdorff distance, from samples on both sides; nothing if a side is empty or not finite.
+fn distance(a: &[Vec<Point>], b: &[Vec<Point>]) -> Option<f64> {
+    let one = farthest(a, &index(b))?;
+    Some(one.max(farthest(b, &index(a))?))
+}
+
+/// The lines of a drawing; dots are left out, because hp2xx keeps only some.
+fn pieces(lines: &[Vec<Point>]) -> impl Iterator<Item = (Point, Point)> + '_ {
+    let ends = lines.iter().flat_map(|line| line.windows(2)).map(|pair| (pair[0], pair[1]));
+    // Nor has a line without length a distance in rstar (0 / 0).
+    ends.filter(|(a, b)| a != b)
+}
+
+fn index(lines: &[Vec<Point>]) -> RTree<Line<[f64; 2]>> {
+    RTree::bulk_load(pieces(lines).map(|(a, b)| Line::new([a.x, a.y], [b.x, b.y])).collect())
+}
+
+fn farthest(lines: &[Vec<Point>], to: &RTree<Line<[f64; 2]>>) -> Option<f64> {
+    let step = (length(lines) / MOST_SAMPLES).max(FINEST_STEP_MM);
+    if !step.is_finite() {
+        return None;
+    }
+    let every = pieces(lines).count() / MOST_SAMPLES as usize + 1;
+    let mut farthest = 0.0_f64;
+    // How far on the next sample lies.
+    let mut next = 0.0;
+    for (number, (from, end)) in pieces(lines).enumerate() {
+        let length = (end - from).hypot();
+        let mut look = |t: f64| {
+            let p = from.lerp(end, t);
+            let squared = to.nearest_neighbor(&[p.x, p.y])?.distance_2(&[p.x, p.y]);
+            farthest = farthest.max(squared);
+            Some(())
+        };
+        if number.is_multiple_of(every) {
+            look(0.0)?;
+            look(1.0)?;
+        }
+        while next < length {
+            look(next / length)?;
+            next += step;
+        }
+        next -= length;
+    }
+    Some(farthest.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_hp2xx_writes_is_read() {
+        let lines = polylines("SP1;PA;PU0.000000,0.000000;PD400.000000,0.0;PD400.0,400.0;PA;PU40,40;PD40,0;");
+        assert_eq!(lines.len(), 2);
+        assert!((length(&lines) - 21.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn distances_are_those_of_the_far_side() {
+        let line = |y: f64| vec![vec![Point::new(0.0, y), Point::new(10.0, y)]];
+        let mut two = line(0.0);
+        two.extend(line(3.0));
+        two.push(vec![Point::new(5.0, 0.0); 2]);
+        two.push(vec![Point::new(5.0, 9.0)]);
+        assert_eq!(distance(&line(0.0), &two), Some(3.0));
+        assert_eq!(distance(&line(0.0), &line(0.0)), Some(0.0));
+        assert_eq!(distance(&line(0.0), &[]), None);
+    }
+
+    #[test]
+    fn every_note_says_who_is_right() {
+        for (file, notes) in notes().unwrap() {
+            assert!(!notes.is_empty(), "{file}");
+            assert!(notes.iter().all(|note| note.right == "plotplan" || note.right == "both"), "{file}");
+        }
+    }
+}
