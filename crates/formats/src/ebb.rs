@@ -1,4 +1,4 @@
-//! Lines for an `EiBotBoard` (EBB): `LT` moves of firmware 2.7 and later, or `SM` moves of older ones.
+//! Lines for an EiBotBoard (EBB): `LT` moves of firmware 2.7 and later, or `SM` moves of older ones.
 //!
 //! Every 40 us the board adds a rate to each axis' accumulator and steps when that reaches 2^31; `LT,T,R1,A1,R2,A2` does so
 //! `T` times (ebb command reference, "LT"). Motors move evenly between a plan's rows, so accelerations are 0 and the rates are
@@ -51,7 +51,7 @@ pub enum Pen {
         up: u16,
         /// Position with the pen down.
         down: u16,
-        /// The output's pin, `RPn`.
+        /// The output's pin, RPn.
         pin: u8,
     },
 }

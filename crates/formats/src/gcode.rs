@@ -20,7 +20,7 @@ use crate::text::Text;
 pub enum Flavour {
     /// grbl 1.1 and grblHAL.
     Grbl,
-    /// `FluidNC`.
+    /// FluidNC.
     FluidNc,
     /// Marlin 2, with `ARC_SUPPORT`.
     Marlin,
@@ -31,7 +31,7 @@ pub enum Flavour {
 /// What moves the pen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pen {
-    /// A servo: spindle speed for grbl and `FluidNC`, degrees for the others.
+    /// A servo: spindle speed for grbl and FluidNC, degrees for the others.
     Servo {
         /// Position with the pen up.
         up: u16,

@@ -1,4 +1,4 @@
-//! Columns for `LinuxCNC`'s `halstreamer` with `cfg=ffb`: both motors' positions and the pen, one line a servo period.
+//! Columns for LinuxCNC's `halstreamer` with `cfg=ffb`: both motors' positions and the pen, one line a servo period.
 //!
 //! A line has no time of its own: it is the period of the thread that the streamer runs in. The plan's period is to be that
 //! (`--period 1ms`); where the motors stand still lines repeat. Positions are those before rounding, in ticks.

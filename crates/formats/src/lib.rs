@@ -11,11 +11,11 @@
 //! | [`coaxial_commands`] | seed 1's command file, in ticks or inches | instants | - |
 //! | [`xy_serial`] | seed 2's serial lines | instants | - |
 //! | [`polar_csv`], [`c_arrays`] | seed 4's table and its program's arrays | instants | - |
-//! | [`ebb`] | an `EiBotBoard`'s `LT` or `SM` moves | rows | - |
-//! | [`gcode`] | G-code of grbl, `FluidNC`, Marlin, Klipper | drawing, or instants | - |
+//! | [`ebb`] | an EiBotBoard's `LT` or `SM` moves | rows | - |
+//! | [`gcode`] | G-code of grbl, FluidNC, Marlin, Klipper | drawing, or instants | - |
 //! | [`klipper_steps`] | Klipper's `queue_step` | rows | - |
 //! | [`joint_trajectory`] | ROS `JointTrajectory` | instants | - |
-//! | [`halstreamer`] | `LinuxCNC`'s streamer columns | instants | - |
+//! | [`halstreamer`] | LinuxCNC's streamer columns | instants | - |
 //! | [`pvt`] | position, velocity, time | instants | - |
 //! | [`svg`] | a drawing as understood | drawing | - |
 //! | [`preview`], [`png`] | a picture of a drawing or a plan on its machine | scene | - |

@@ -27,6 +27,11 @@ pub(crate) enum Command {
     Verify(Verify),
     /// Draw a picture of a drawing or a plan on its machine
     Preview(Preview),
+    /// Send a plan to a machine
+    Send(Send),
+    /// Be a machine on a pseudo-terminal, to try senders on
+    #[cfg(unix)]
+    Device(Device),
     /// List, show and check machines
     #[command(subcommand)]
     Machine(Machine),
@@ -219,6 +224,124 @@ pub(crate) struct Preview {
     pub(crate) planning: Planning,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct Send {
+    /// Plan to send, or for gcode, xy-serial and raw a file in the machine's own words; `-` for standard input
+    pub(crate) plan: String,
+    /// Serial port
+    #[arg(short, long, value_name = "PATH", required_unless_present = "dry_run")]
+    pub(crate) port: Option<String>,
+    /// How to talk to the machine
+    #[arg(long, value_enum)]
+    pub(crate) protocol: Protocol,
+    /// Speed of the port
+    #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
+    pub(crate) baud: u32,
+    /// Flow control of the port
+    #[arg(long, value_enum, default_value_t = Flow::None)]
+    pub(crate) flow: Flow,
+    /// Go on from this row of the plan: where a sync line is, or where it was stopped
+    #[arg(long, value_name = "ROW")]
+    pub(crate) from: Option<u64>,
+    /// Print what would be sent, with its time, and send nothing
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// Write all that goes over the wire to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) log: Option<String>,
+    /// For ticks: lines on the way at once [default: 8]. For gcode: bytes in the machine's buffer [default: 127]
+    #[arg(long, value_name = "N")]
+    pub(crate) window: Option<usize>,
+    /// For paced: how long before its time a line is sent
+    #[arg(long, value_name = "TIME", default_value = "200ms", value_parser = time)]
+    pub(crate) lead: f64,
+    /// How long to wait for a port that has gone away
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time)]
+    pub(crate) reconnect: f64,
+    /// The machine, where the plan only knows its name and it is no preset
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    /// For ebb: SM moves, which every firmware knows
+    #[arg(long)]
+    pub(crate) stepper_moves: bool,
+    #[command(flatten)]
+    pub(crate) pen: PenLift,
+}
+
+/// How to talk to a machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Protocol {
+    /// Tick lines with numbers and checksums, answered
+    Ticks,
+    /// The single-belt plotter's lines, answered by 1
+    XySerial,
+    /// G-code for grbl, grblHAL and FluidNC
+    Gcode,
+    /// EiBotBoard
+    Ebb,
+    /// Lines as they are, paced by the port's flow control
+    Raw,
+    /// Tick lines at their time, without answers or flow control
+    Paced,
+}
+
+/// Who says when a port may be written to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Flow {
+    /// Nobody
+    None,
+    /// RTS and CTS
+    Hardware,
+    /// XON and XOFF
+    Software,
+}
+
+#[cfg(unix)]
+#[derive(Debug, Args)]
+pub(crate) struct Device {
+    /// Which machine to be
+    #[arg(long, value_enum)]
+    pub(crate) protocol: DeviceProtocol,
+    /// Name to give the pseudo-terminal, as a link; it is printed either way
+    #[arg(long, value_name = "PATH")]
+    pub(crate) link: Option<String>,
+    /// Where to draw what was drawn, at the end
+    #[arg(long, value_name = "OUT.svg")]
+    pub(crate) svg: Option<String>,
+    /// Where to write what was drawn as a table, at the end: line, pen, and place in the machine's own units
+    #[arg(long, value_name = "OUT.csv")]
+    pub(crate) ink: Option<String>,
+    /// Whose motors they are, for ticks and ebb: where they start, and what they draw
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    /// What goes wrong: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N
+    #[arg(long, value_name = "FAULT", value_parser = fault)]
+    pub(crate) fault: Vec<sending::device::Fault>,
+    /// How many times faster than the clock it lives
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub(crate) haste: f64,
+    /// End when nothing has come in for so long, after something has; by its own clock
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub(crate) rest: Option<f64>,
+    /// For xy-serial: it has homed before
+    #[arg(long)]
+    pub(crate) homed: bool,
+}
+
+/// The machines that can be tried.
+#[cfg(unix)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DeviceProtocol {
+    /// A reader of tick lines, with or without numbers
+    Ticks,
+    /// The single-belt plotter
+    XySerial,
+    /// A grbl with its buffer of 128 bytes
+    Gcode,
+    /// An EiBotBoard
+    Ebb,
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum Machine {
     /// List the machines that come with plotplan
@@ -328,6 +451,26 @@ fn positions(text: &str) -> Result<(i16, i16), String> {
     let (up, down) = text.split_once(',').ok_or("two whole numbers with a comma between, such as 40,90")?;
     let number = |text: &str| text.trim().parse().map_err(|_| format!("{text} is not a whole number"));
     Ok((number(up)?, number(down)?))
+}
+
+#[cfg(unix)]
+fn fault(text: &str) -> Result<sending::device::Fault, String> {
+    use sending::device::Fault;
+    let what = "a fault is KIND=N or KIND=N:TIME, such as lost-answer=5 or unplugged=2s:1s";
+    let (kind, value) = text.split_once('=').ok_or(what)?;
+    let (first, second) = value.split_once(':').map_or((value, None), |(a, b)| (a, Some(b)));
+    let number = |text: &str| text.parse::<u64>().map_err(|_| format!("{text} is not a whole number"));
+    let microseconds = |text: &str| Ok::<u64, String>((time(text)? * 1e6).round() as u64);
+    let lasting = || microseconds(second.ok_or(what)?);
+    Ok(match kind {
+        "lost-answer" => Fault::LostAnswer(number(first)?),
+        "late-answer" => Fault::LateAnswer(number(first)?, lasting()?),
+        "garbled-answer" => Fault::GarbledAnswer(number(first)?),
+        "garbled-byte" => Fault::GarbledByte(number(first)?),
+        "full-buffer" => Fault::FullBuffer(microseconds(first)?, lasting()?),
+        "unplugged" => Fault::Unplugged(microseconds(first)?, lasting()?),
+        _ => return Err(what.to_owned()),
+    })
 }
 
 fn time(text: &str) -> Result<f64, String> {

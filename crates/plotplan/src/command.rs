@@ -2,11 +2,14 @@
 
 mod check;
 mod convert;
+#[cfg(unix)]
+mod device;
 mod firmware;
 mod info;
 mod machine;
 mod motion;
 mod preview;
+mod send;
 mod verify;
 
 use std::fmt::Write as _;
@@ -30,6 +33,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Info(info) => info::run(info),
         Command::Verify(verify) => verify::run(verify),
         Command::Preview(preview) => preview::run(preview),
+        Command::Send(send) => send::run(send),
+        #[cfg(unix)]
+        Command::Device(device) => device::run(device),
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
             if explain.code == "plotters" {

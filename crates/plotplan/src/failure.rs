@@ -15,6 +15,8 @@ pub(crate) enum Failure {
     Usage(anyhow::Error),
     /// Reading or writing failed: exit 3.
     Io(anyhow::Error),
+    /// Stopped by whoever is in charge: exit 130, as shells have it. All has been said already.
+    Interrupted,
     /// Whoever read our output has seen enough: quiet, exit 0.
     ClosedPipe,
 }
@@ -25,6 +27,7 @@ impl Failure {
         let (code, error) = match self {
             Self::ClosedPipe => return ExitCode::SUCCESS,
             Self::Refused => return ExitCode::from(1),
+            Self::Interrupted => return ExitCode::from(130),
             Self::Drawing(error) => (1, error),
             Self::Usage(error) => (2, error),
             Self::Io(error) => (3, error),

@@ -7,6 +7,9 @@ mod command;
 mod failure;
 mod input;
 mod output;
+mod port;
+#[cfg(unix)]
+mod pseudo_terminal;
 mod terminal;
 
 fn main() -> ExitCode {

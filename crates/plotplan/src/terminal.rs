@@ -216,3 +216,38 @@ impl Progress {
         self.bar.finish_and_clear();
     }
 }
+
+/// Shows how far a machine has come, and how long it will take, on a terminal only.
+pub(crate) struct SendingProgress {
+    bar: ProgressBar,
+}
+
+impl SendingProgress {
+    pub(crate) fn new(of_us: u64) -> Self {
+        let bar = if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(of_us / 1000);
+            if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent}% {msg}") {
+                bar.set_style(style);
+            }
+            bar
+        } else {
+            ProgressBar::hidden()
+        };
+        Self { bar }
+    }
+
+    pub(crate) fn show(&self, progress: &sending::Progress) {
+        if self.bar.is_hidden() {
+            return;
+        }
+        let left = progress.of_us.saturating_sub(progress.done_us) as f64 * 1e-6;
+        self.bar.set_length(progress.of_us / 1000);
+        self.bar.set_position(progress.done_us / 1000);
+        let left = plotplan::report::clock(left);
+        self.bar.set_message(format!("line {} of {}, {left} left", progress.lines, progress.of_lines));
+    }
+
+    pub(crate) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

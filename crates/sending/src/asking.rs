@@ -374,6 +374,7 @@ impl Conversation for Asking {
             done_us: self.steps[..self.taken].iter().map(|step| step.lasts_us).sum(),
             of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
             row: self.row(self.taken),
+            at_most: self.row(self.ever.max(self.taken)),
             resent: self.resent,
             asked: self.asked,
         }

@@ -95,12 +95,14 @@ impl Conversation for Blind {
     }
 
     fn progress(&self) -> Progress {
+        let row = self.said.checked_sub(1).map_or(0, |last| self.steps[last].row);
         Progress {
             lines: self.said as u64,
             of_lines: self.steps.len() as u64,
             done_us: self.clock_us,
             of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
-            row: self.said.checked_sub(1).map_or(0, |last| self.steps[last].row),
+            row,
+            at_most: row,
             resent: 0,
             asked: 0,
         }

@@ -13,6 +13,8 @@ pub struct Progress {
     pub of_us: u64,
     /// Index of the row that holds when they have been done.
     pub row: u64,
+    /// Index of the row that holds when everything has been done that was said.
+    pub at_most: u64,
     /// Lines that were sent more than once.
     pub resent: u64,
     /// Times that the machine was asked where it stands.

@@ -17,6 +17,7 @@ pub mod blind;
 pub mod conversation;
 pub mod device;
 pub mod ink;
+pub mod locating;
 pub mod numbered;
 pub mod repeating;
 mod retime;

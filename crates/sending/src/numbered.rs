@@ -10,6 +10,7 @@
 //! | `ok NUMBER*SUM` | everything before that number has been taken, this is what comes next |
 //! | `error NUMBER WHY*SUM` | this line cannot be followed |
 //! | `at T1 T2 MOVING*SUM` | where the motors are, and whether they are going to move (1) or not (0) |
+//! | `at unknown*SUM` | they have been homed, and nothing was said since |
 //!
 //! A machine takes a line if its sum is right and its number is the next; whatever else comes, it answers with the number
 //! that it wants. So the sender may say anything again at any time: nothing is done twice, nothing is left out.
@@ -184,6 +185,7 @@ impl Conversation for Numbered {
             done_us: self.steps[..self.taken].iter().map(|step| step.lasts_us).sum(),
             of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
             row: self.row(self.taken),
+            at_most: self.row(self.ever),
             resent: self.resent,
             asked: 0,
         }

@@ -211,6 +211,7 @@ impl Conversation for Repeating {
             done_us: self.steps[..self.done].iter().map(|step| step.lasts_us).sum(),
             of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
             row: self.row(self.done),
+            at_most: self.row(self.steps.len().min(self.done + 1)),
             resent: self.resent,
             asked: 0,
         }

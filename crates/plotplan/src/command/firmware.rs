@@ -67,10 +67,10 @@ fn put(
         Format::XySerial => formats::xy_serial::write(instants(), out),
         Format::PolarCsv => formats::polar_csv::write(instants(), out),
         Format::CArrays => formats::c_arrays::write(instants(), out),
-        Format::Ebb => ebb::write(rows(), ebb::Moves::Timed, ebb_pen(&arguments.pen), out),
-        Format::EbbSm => ebb::write(rows(), ebb::Moves::Stepper, ebb_pen(&arguments.pen), out),
+        Format::Ebb => ebb::write(rows(), ebb::Moves::Timed, ebb_pen(arguments.pen), out),
+        Format::EbbSm => ebb::write(rows(), ebb::Moves::Stepper, ebb_pen(arguments.pen), out),
         Format::GcodeTimed => {
-            let options = gcode_options(gcode::Flavour::Grbl, machine, &arguments.pen);
+            let options = gcode_options(gcode::Flavour::Grbl, machine, arguments.pen);
             gcode::write(&gcode::timed(instants(), &options, true), out)
         }
         Format::KlipperSteps => formats::klipper_steps::write(rows(), out),
@@ -87,7 +87,7 @@ fn put(
         Format::Halstreamer => formats::halstreamer::write(instants(), compiled.header.period_us, out),
         Format::Pvt => formats::pvt::write(&instants().collect::<Vec<_>>(), names, out),
         other => {
-            let options = gcode_options(flavour(other), machine, &arguments.pen);
+            let options = gcode_options(flavour(other), machine, arguments.pen);
             let speeds = stroke_speeds(machine, compiled);
             let park = machine.geometry().forward(&machine.start());
             gcode::write(&gcode::commands(&compiled.ordered, &speeds, park, &options), out)
@@ -105,7 +105,7 @@ fn flavour(format: Format) -> gcode::Flavour {
 }
 
 /// How the EiBotBoard is told to move the pen.
-pub(crate) fn ebb_pen(pen: &PenLift) -> ebb::Pen {
+pub(crate) fn ebb_pen(pen: PenLift) -> ebb::Pen {
     if pen.pen_by.is_none() && pen.pen_positions.is_none() {
         return ebb::Pen::Toggle;
     }
@@ -115,17 +115,14 @@ pub(crate) fn ebb_pen(pen: &PenLift) -> ebb::Pen {
 }
 
 /// How G-code is said on this machine.
-pub(crate) fn gcode_options(flavour: gcode::Flavour, machine: &Machine, pen: &PenLift) -> gcode::Options {
+pub(crate) fn gcode_options(flavour: gcode::Flavour, machine: &Machine, pen: PenLift) -> gcode::Options {
     let lift = machine.pen();
-    let by = match pen.pen_by {
-        Some(PenBy::Z) => {
-            let (up, down) = pen.pen_positions.unwrap_or((5, 0));
-            gcode::Pen::Z { up, down }
-        }
-        _ => {
-            let (up, down) = pen.pen_positions.unwrap_or((40, 90));
-            gcode::Pen::Servo { up: up.max(0) as u16, down: down.max(0) as u16 }
-        }
+    let by = if pen.pen_by == Some(PenBy::Z) {
+        let (up, down) = pen.pen_positions.unwrap_or((5, 0));
+        gcode::Pen::Z { up, down }
+    } else {
+        let (up, down) = pen.pen_positions.unwrap_or((40, 90));
+        gcode::Pen::Servo { up: up.max(0) as u16, down: down.max(0) as u16 }
     };
     gcode::Options {
         flavour,

@@ -1,4 +1,4 @@
-//! An `EiBotBoard`: commands one after the other, `OK` once there was room in the FIFO of one move, accumulators as the command
+//! An EiBotBoard: commands one after the other, `OK` once there was room in the FIFO of one move, accumulators as the command
 //! reference has them.
 //!
 //! Every 40 us `Rate += Accel`, `Accumulator += Rate`, and a step when the accumulator reaches 2^31; the initial rate is lowered by

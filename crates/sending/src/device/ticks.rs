@@ -148,9 +148,9 @@ impl Ticks {
 
     fn numbered(&mut self, text: &str) {
         if text == "where" {
-            let [a, b] = self.position.unwrap_or_default();
             let moving = u8::from(!self.queue.is_empty());
-            self.answer(&framed(&format!("at {a} {b} {moving}")));
+            let at = self.position.map(|[a, b]| format!("at {a} {b} {moving}"));
+            self.answer(&framed(&at.unwrap_or_else(|| "at unknown".to_owned())));
             return;
         }
         let Some((number, line)) = text.split_once(':') else { return };

@@ -1,0 +1,65 @@
+//! A pseudo-terminal: one end for us, and a path for whoever takes it for a serial port.
+
+use std::io;
+use std::os::fd::OwnedFd;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags, open};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+/// Both ends. The other one is held open, so that a program may come and go.
+pub(crate) struct PseudoTerminal {
+    ours: OwnedFd,
+    _theirs: OwnedFd,
+    path: PathBuf,
+}
+
+impl PseudoTerminal {
+    /// Opens a new one, without echo and without any change to what goes through.
+    pub(crate) fn open() -> io::Result<Self> {
+        let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        grantpt(&ours)?;
+        unlockpt(&ours)?;
+        let name = ptsname(&ours, Vec::new())?;
+        let theirs = open(name.as_c_str(), OFlags::RDWR | OFlags::NOCTTY, Mode::empty())?;
+        let mut attributes = tcgetattr(&theirs)?;
+        attributes.make_raw();
+        tcsetattr(&theirs, OptionalActions::Now, &attributes)?;
+        Ok(Self { ours, _theirs: theirs, path: name.to_string_lossy().into_owned().into() })
+    }
+
+    /// What programs open.
+    pub(crate) fn path(&self) -> &PathBuf {
+        &self.path
+    }
+
+    /// At most so many bytes that have come in, waiting for the first of them no longer than this.
+    pub(crate) fn read(&self, most: usize, within: Duration) -> io::Result<Vec<u8>> {
+        if most == 0 {
+            std::thread::sleep(within.min(Duration::from_millis(1)));
+            return Ok(Vec::new());
+        }
+        let mut wanted = [PollFd::new(&self.ours, PollFlags::IN)];
+        let within = Timespec { tv_sec: within.as_secs() as i64, tv_nsec: i64::from(within.subsec_nanos()) };
+        match poll(&mut wanted, Some(&within)) {
+            Ok(0) | Err(rustix::io::Errno::INTR) => return Ok(Vec::new()),
+            other => other?,
+        };
+        let mut buffer = vec![0; most.min(4096)];
+        let count = rustix::io::read(&self.ours, &mut buffer)?;
+        buffer.truncate(count);
+        Ok(buffer)
+    }
+
+    /// Writes all of it.
+    pub(crate) fn write(&self, mut bytes: &[u8]) -> io::Result<()> {
+        while !bytes.is_empty() {
+            let count = rustix::io::write(&self.ours, bytes)?;
+            bytes = &bytes[count..];
+        }
+        Ok(())
+    }
+}
