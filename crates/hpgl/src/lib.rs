@@ -24,7 +24,9 @@ mod interpreter;
 mod lexer;
 mod mnemonics;
 mod parser;
+mod producers;
 mod profile;
+mod summary;
 mod syntax;
 mod units;
 
@@ -35,7 +37,9 @@ pub use drawing::{Drawing, Pen, Point, Span};
 pub use emit::{EmitOptions, Encoding, emit};
 pub use interpreter::interpret;
 pub use mnemonics::all as known_commands;
+pub use producers::producer;
 pub use profile::{Options, Paper, Plotter, plotters};
+pub use summary::{Generation, Profile, ProfileReason, Summary, Wrappers};
 pub use syntax::{Command, Mnemonic, Syntax};
 pub use units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
 
@@ -46,7 +50,7 @@ pub struct Reading {
     pub pages: Vec<Page>,
     /// What was found, one entry a kind, in the order of their first places.
     pub diagnostics: Vec<Diagnostic>,
-    /// What the file consists of.
+    /// What the file consists of, and what it was read for.
     pub summary: Summary,
 }
 
@@ -73,15 +77,6 @@ pub struct PenSettings {
     pub width_mm: Option<f64>,
 }
 
-/// What a file consists of.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Summary {
-    /// How many commands it has, known ones and unknown ones.
-    pub commands: usize,
-    /// The known commands in it, each with how often it occurs, in the order of the alphabet.
-    pub used: Vec<(Mnemonic, u64)>,
-}
-
 /// Takes a file apart without giving it a meaning; linear in its length.
 pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {
     parser::Parser::new(bytes, options.label_terminator).collect()
@@ -105,5 +100,5 @@ pub fn read(bytes: &[u8], options: &Options) -> Reading {
             break;
         }
     }
-    interpreter.finish(parser.number(), parser.findings)
+    interpreter.finish(parser.number(), parser.hints.wrappers, parser.findings)
 }

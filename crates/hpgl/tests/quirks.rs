@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use hpgl::{Options, Reading, Severity, read};
+use hpgl::{Generation, Options, Point, ProfileReason, Reading, Severity, Wrappers, read};
 
 fn reading(bytes: &[u8]) -> Reading {
     let options = Options::default();
@@ -200,6 +200,11 @@ fn text_does_not_swallow_the_plot() {
     assert!(!hidden(b"IN;CO \"a;PD9999,9999;\";SP1;PA0,0;PD400,0;PU;SP0;"));
     assert!(!hidden(b"BP1,\"a;PD9999,9999;\";SP1;PA0,0;PD400,0;PU;SP0;"));
     // IN and DF bring the usual terminator back.
+    // Mode 0 prints the terminator too.
+    let strokes = |file: &[u8]| read(file, &Options::default()).pages[0].drawing.strokes.len();
+    assert_eq!(strokes(b"IN;SP1;DT#,0;LBi#PU;"), strokes(b"IN;SP1;LBi#\x03PU;"));
+    assert_eq!(strokes(b"IN;SP1;DT#,1;LBi#PU;"), strokes(b"IN;SP1;LBi\x03PU;"));
+    assert_eq!(strokes(b"IN;SP1;DT#,0;DT;LBi#\x03PU;"), strokes(b"IN;SP1;LBi#\x03PU;"));
     assert!(!hidden(b"DT#;IN;SP1;PA0,0;LB#1\x03PD400,0;PU;SP0;"));
     assert!(hidden(b"IN;SP1;PA0,0;LBhello;PD400,0;PU;SP0;"));
     assert!(hidden(b"IN;SP1;PA0,0;PD400,0;PU;PA500,500;LBhello"));
@@ -544,4 +549,34 @@ fn the_file_chooses_its_plotter() {
     let reading = read(b"IN;PS4;SP1;SC0,1,0,1;PA0,0;PD1,1;", &options);
     let end = reading.pages[0].drawing.strokes[0].end();
     assert!((end.x - 15370.0 * hpgl::PLOTTER_UNIT_7475A_MM).abs() < 1e-9);
+}
+
+#[test]
+fn what_a_file_was_read_for_is_on_record() {
+    let summary = |file: &[u8]| read(file, &Options::default()).summary;
+    let plain = summary(b"IN;SP1;PU0,0;PD400,0;");
+    assert_eq!(plain.generation(), Generation::HpGl);
+    assert_eq!(plain.wrappers, Wrappers::default());
+    assert_eq!(plain.profile.reason, ProfileReason::Assumed);
+    assert_eq!(plain.profile.scaling_points, (Point::new(603.0, 521.0), Point::new(10603.0, 7721.0)));
+    assert_eq!(plain.profile.unit_mm, 0.025);
+
+    assert_eq!(summary(b"IN;PS0;SP1;PD1,2;").profile.reason, ProfileReason::PaperCode);
+    assert_eq!(summary(b"IN;PS0;SP1;PD1,2;").profile.hard_clip.x1, 16158.0);
+    // The reset at the end of a job does not hide what the job was read for.
+    let job =
+        b"\x1b%-12345X@PJL ENTER LANGUAGE=HPGL2\n\x1b%-1BBPINPS4000,2000SP1PD1,2PG;\x1b%0A\x1bE\x1b%-12345X";
+    let job = summary(job);
+    assert_eq!(job.generation(), Generation::HpGl2);
+    assert_eq!(job.wrappers, Wrappers { device_control: false, pcl: true, job_control: true });
+    assert_eq!(job.profile.reason, ProfileReason::PageSize);
+    assert_eq!(job.profile.scaling_points.1, Point::new(4000.0, 2000.0));
+    assert_eq!(summary(b"BP;IN;SP1;PD1,2;").profile.reason, ProfileReason::HpGl2);
+    assert_eq!(
+        summary(b"\x1bE\x1b*c7200x3600Y\x1b%0BIN;SP1;PD1,2;\x1b%0A\x1bE").profile.reason,
+        ProfileReason::PictureFrame
+    );
+    assert!(summary(b"\x1b.I81;;17:IN;SP1;PD1,2;").wrappers.device_control);
+    let named = Options::for_plotter("hp7550a", None).unwrap();
+    assert_eq!(read(b"IN;SP1;PD1,2;", &named).summary.profile.reason, ProfileReason::Options);
 }

@@ -9,6 +9,7 @@
 use drawing::{Affine, Point, Rect, Vec2};
 
 use crate::profile::{Options, Paper};
+use crate::summary::{Profile, ProfileReason};
 
 /// The ranges that `SC` gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +80,8 @@ pub(crate) struct Frame {
     /// Unless the file set a page, its edges do not clip; a page of one length is open towards y.
     page_clip: Option<Rect>,
     page_set: bool,
+    /// Why the plotter is the one it is.
+    reason: ProfileReason,
     /// P1 and P2 are those of the plotter, by nobody's word.
     points_assumed: bool,
     p1: Point,
@@ -103,6 +106,7 @@ impl Frame {
             hard_clip: options.hard_clip,
             page_clip: None,
             page_set: false,
+            reason: if options.automatic { ProfileReason::Assumed } else { ProfileReason::Options },
             points_assumed: true,
             p1: options.scaling_points.0,
             p2: options.scaling_points.1,
@@ -138,6 +142,7 @@ impl Frame {
         self.hard_clip = self.default_hard_clip;
         self.page_clip = None;
         self.page_set = false;
+        self.reason = if self.automatic { ProfileReason::Assumed } else { ProfileReason::Options };
         self.initialise();
     }
 
@@ -310,6 +315,7 @@ impl Frame {
             None => Rect::new(0.0, -open, length, open),
         });
         self.page_set = true;
+        self.reason = ProfileReason::PageSize;
         self.window = None;
         self.reset_points();
     }
@@ -323,6 +329,7 @@ impl Frame {
         let [left, bottom, right, top] = paper.hard_clip;
         self.default_points = (Point::new(x1, y1), Point::new(x2, y2));
         self.hard_clip = Rect::new(left, bottom, right, top);
+        self.reason = ProfileReason::PaperCode;
         if self.points_assumed {
             self.reset_points();
         }
@@ -336,8 +343,23 @@ impl Frame {
         }
         let Rect { x0, y0, x1, y1 } = self.hard_clip;
         self.default_points = (Point::new(x0, y0), Point::new(x1, y1));
+        if self.reason == ProfileReason::Assumed {
+            self.reason = ProfileReason::HpGl2;
+        }
         if self.points_assumed {
             self.reset_points();
+        }
+    }
+
+    /// The plotter that the file is read for, as it is now.
+    pub(crate) fn profile(&self) -> Profile {
+        let Rect { x0, y0, x1, y1 } = self.hard_clip;
+        let corners = (Point::new(x0, y0), Point::new(x1, y1));
+        Profile {
+            scaling_points: if self.page_set { corners } else { self.default_points },
+            hard_clip: self.hard_clip,
+            unit_mm: self.unit_mm,
+            reason: self.reason,
         }
     }
 
@@ -355,6 +377,7 @@ impl Frame {
     pub(crate) fn set_picture_frame(&mut self, width: f64, height: f64) {
         self.hard_clip = Rect::new(0.0, 0.0, width, height);
         self.page_set = true;
+        self.reason = ProfileReason::PictureFrame;
         self.reset_points();
     }
 

@@ -21,7 +21,7 @@ use crate::diagnostics::{Code, Findings};
 use crate::fonts::Glyph;
 use crate::profile::Options;
 use crate::syntax::{Command, Mnemonic, Syntax};
-use crate::{Page, Reading, Summary};
+use crate::{Page, Profile, Reading, Summary, Wrappers};
 use characters::Characters;
 use fill::FillType;
 use frame::Frame;
@@ -44,7 +44,7 @@ pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Reading {
         interpreter.execute(&command);
     }
     findings.place(placed, interpreter.pen_position());
-    interpreter.finish(syntax.command_count, findings)
+    interpreter.finish(syntax.command_count, syntax.hints.wrappers, findings)
 }
 
 /// How many hatch lines, and how many dashes, a file can come to: enough for a large sheet filled solid, and little enough to
@@ -94,6 +94,8 @@ pub(crate) struct Interpreter {
     pieces_left: u64,
     pages: Vec<Page>,
     findings: Findings,
+    /// The plotter that the file was read for, before a reset forgot it.
+    profile: Option<Profile>,
     /// How often each command occurred, by the index of its letters.
     used: Vec<u64>,
     mnemonic: Mnemonic,
@@ -129,6 +131,7 @@ impl Interpreter {
             pieces_left: pieces,
             pages: Vec::new(),
             findings: Findings::default(),
+            profile: None,
             used: vec![0; 26 * 26],
             mnemonic: Mnemonic::NONE,
             span: Span::default(),
@@ -344,7 +347,12 @@ impl Interpreter {
     }
 
     /// The end of the file.
-    pub(crate) fn finish(mut self, commands: usize, syntax_findings: Findings) -> Reading {
+    pub(crate) fn finish(
+        mut self,
+        commands: usize,
+        wrappers: Wrappers,
+        syntax_findings: Findings,
+    ) -> Reading {
         if self.polygon.is_open() {
             self.report(codes::OPEN_POLYGON, || "the file ends inside a polygon (PM0 without PM2)".into());
         }
@@ -354,6 +362,8 @@ impl Interpreter {
         }
         self.settle_ink_of_no_pen();
         self.report_pages();
+        self.note_profile();
+        let profile = self.profile.unwrap_or_default();
         let mut diagnostics = syntax_findings.into_vec();
         diagnostics.extend(self.findings.into_vec());
         diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
@@ -366,6 +376,7 @@ impl Interpreter {
             })
             .filter(|&(_, count)| count > 0)
             .collect();
-        Reading { pages: self.pages, diagnostics, summary: Summary { commands, used } }
+        let summary = Summary { commands, used, wrappers, profile };
+        Reading { pages: self.pages, diagnostics, summary }
     }
 }

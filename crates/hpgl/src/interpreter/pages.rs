@@ -3,8 +3,8 @@
 use drawing::Drawing;
 
 use super::Interpreter;
-use crate::Page;
 use crate::codes;
+use crate::{Page, ProfileReason};
 
 impl Interpreter {
     /// Ends the sheet if anything is on it.
@@ -38,8 +38,17 @@ impl Interpreter {
     /// A reset of the printer, or the end of its job.
     pub(super) fn reset(&mut self) {
         self.advance_page();
+        self.note_profile();
         self.frame.forget_page();
         self.initialise();
+    }
+
+    /// Keeps on record what the file was read for, unless it is nothing that the file said.
+    pub(super) fn note_profile(&mut self) {
+        let now = self.frame.profile();
+        if self.profile.is_none() || now.reason != ProfileReason::Assumed {
+            self.profile = Some(now);
+        }
     }
 
     /// Says so where there is more than one sheet.

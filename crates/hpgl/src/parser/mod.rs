@@ -13,6 +13,7 @@ use crate::diagnostics::{Code, Findings};
 use crate::envelope;
 use crate::lexer::{Class, class, scan_number};
 use crate::mnemonics::{Form, form_of};
+use crate::summary::Wrappers;
 use crate::syntax::{Command, Entry, Mnemonic, Syntax};
 
 /// The terminator of labels until `DT` names another: ETX.
@@ -58,6 +59,8 @@ impl From<Option<Head>> for Step {
 pub(crate) struct Hints {
     /// The file is UTF-8 made from Latin-1: bytes above 127 arrive as two.
     pub(crate) reencoded: bool,
+    /// What stands around the commands.
+    pub(crate) wrappers: Wrappers,
 }
 
 /// A command without its parameters, which the parser keeps.
@@ -76,6 +79,8 @@ pub(crate) struct Parser<'a> {
     language: Language,
     default_terminator: u8,
     terminator: u8,
+    /// The terminator is printed too (`DT` with mode 0).
+    prints_terminator: bool,
     number: usize,
     parameters: Vec<f64>,
     /// The mnemonic and start of a coordinate list whose next piece begins at `at`.
@@ -98,6 +103,7 @@ impl<'a> Parser<'a> {
             language: Language::HpGl,
             default_terminator: terminator,
             terminator,
+            prints_terminator: false,
             number: 0,
             parameters: Vec::new(),
             unfinished: None,
@@ -411,7 +417,7 @@ impl<'a> Parser<'a> {
     fn command(&mut self, mnemonic: Mnemonic, form: Form, start: usize) -> Option<Head> {
         self.number += 1;
         if matches!(&mnemonic.0, b"IN" | b"DF" | b"BP") {
-            self.terminator = self.default_terminator;
+            self.restore_terminator();
         }
         Some(match form {
             Form::Numbers => return self.numbers(mnemonic, start),
@@ -610,6 +616,7 @@ impl<'a> Parser<'a> {
                         self.at = at;
                         return line_ends;
                     };
+                    self.hints.wrappers.device_control = true;
                     at += length.bytes;
                 }
                 Class::Digit | Class::Sign | Class::Point => {

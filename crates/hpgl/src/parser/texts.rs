@@ -34,7 +34,8 @@ impl Parser<'_> {
             }
             end += 1;
         }
-        let text = Span { start: first, end };
+        let prints = self.prints_terminator && cut.is_none() && end < self.bytes.len();
+        let text = Span { start: first, end: end + usize::from(prints) };
         let at_end = end == self.bytes.len();
         if at_end || cut.is_some() {
             let terminator = self.terminator.escape_ascii();
@@ -67,7 +68,7 @@ impl Parser<'_> {
     pub(super) fn define_terminator(&mut self, mnemonic: Mnemonic, start: usize) -> Head {
         match self.bytes.get(self.at) {
             None | Some(b';') => {
-                self.terminator = self.default_terminator;
+                self.restore_terminator();
                 self.at = (self.at + 1).min(self.bytes.len());
                 return self.textless(mnemonic, start);
             }
@@ -91,6 +92,7 @@ impl Parser<'_> {
             self.at += 1;
         }
         self.number_list(mnemonic, false, true);
+        self.prints_terminator = self.parameters.first() == Some(&0.0);
         self.finish(mnemonic, start, text)
     }
 

@@ -20,10 +20,12 @@ impl Parser<'_> {
         let span = Span { start, end: self.at };
         match found {
             Escape::DeviceControl(control) => {
+                self.hints.wrappers.device_control = true;
                 self.report_device_control(start, control);
                 None
             }
             Escape::EnterHpGl(parameter) => {
+                self.hints.wrappers.pcl = true;
                 self.language = Language::HpGl;
                 self.parameters.push(f64::from(parameter));
                 Some(self.wrapper(Mnemonic::ENTER, start))
@@ -65,8 +67,9 @@ impl Parser<'_> {
         }
     }
 
-    fn restore_terminator(&mut self) {
+    pub(super) fn restore_terminator(&mut self) {
         self.terminator = self.default_terminator;
+        self.prints_terminator = false;
     }
 
     fn report_device_control(&mut self, start: usize, control: DeviceControl) {
@@ -126,6 +129,7 @@ impl Parser<'_> {
         let rest = &self.bytes[self.at..];
         let Some(&byte) = rest.first() else { return Step::End };
         if let Some((length, language)) = envelope::job_line(rest) {
+            self.hints.wrappers.job_control = true;
             self.at += length;
             if let Some(language) = language {
                 let hpgl = language.to_ascii_uppercase().starts_with(b"HPGL");

@@ -1,0 +1,82 @@
+//! What a file consists of, and what it was read for.
+
+use drawing::{Point, Rect};
+
+use crate::syntax::Mnemonic;
+
+/// What a file consists of, and what it was read for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// How many commands it has, known ones and unknown ones.
+    pub commands: usize,
+    /// The known commands in it, each with how often it occurs, in the order of the alphabet.
+    pub used: Vec<(Mnemonic, u64)>,
+    /// What stands around the commands.
+    pub wrappers: Wrappers,
+    /// The plotter that it was read for.
+    pub profile: Profile,
+}
+
+impl Summary {
+    /// The generation of the language: that of the newest command in it.
+    pub fn generation(&self) -> Generation {
+        // What the first generation does not have; PS, PG, SM and the like are in both.
+        const SECOND: [&[u8; 2]; 27] = [
+            b"AC", b"AD", b"BP", b"BR", b"BZ", b"CF", b"CO", b"CR", b"DL", b"FI", b"FN", b"LA", b"LM", b"MC",
+            b"MG", b"NP", b"PC", b"PE", b"PP", b"PW", b"QL", b"SB", b"SD", b"SV", b"TD", b"TR", b"WU",
+        ];
+        let second = self.used.iter().any(|(mnemonic, _)| SECOND.contains(&&mnemonic.0));
+        if second || self.wrappers.pcl { Generation::HpGl2 } else { Generation::HpGl }
+    }
+}
+
+/// A generation of the language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Generation {
+    /// HP-GL, of pen plotters since 1976.
+    HpGl,
+    /// HP-GL/2, of large plotters and printers since 1988.
+    HpGl2,
+}
+
+/// What stands around the commands of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wrappers {
+    /// Device control of plotters on a serial line (`ESC .`).
+    pub device_control: bool,
+    /// The printer language PCL, or RTL, its raster part for plotters (`ESC %0B` and others).
+    pub pcl: bool,
+    /// Job control (`@PJL`).
+    pub job_control: bool,
+}
+
+/// The plotter that a file was read for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// P1 and P2 as long as no `IP` sets them, plotter units.
+    pub scaling_points: (Point, Point),
+    /// The area that the pen reaches, plotter units.
+    pub hard_clip: Rect,
+    /// Size of a plotter unit, mm.
+    pub unit_mm: f64,
+    /// Why this one.
+    pub reason: ProfileReason,
+}
+
+/// Why a file was read for a plotter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProfileReason {
+    /// The file says nothing about its plotter.
+    #[default]
+    Assumed,
+    /// The options name it.
+    Options,
+    /// The file names its paper by a code (`PS4`).
+    PaperCode,
+    /// The file is HP-GL/2, where P1 and P2 are the corners of the page.
+    HpGl2,
+    /// The file gives the size of its page (`PS` with lengths).
+    PageSize,
+    /// The file gives the size of a picture frame in PCL.
+    PictureFrame,
+}
