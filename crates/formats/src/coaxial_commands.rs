@@ -110,7 +110,7 @@ fn write_as<W: Write + ?Sized>(
                 stroke.push(place);
             }
             if instant.row.pen != last.pen {
-                stroke.dedup_by_key(|place| place.ticks);
+                stroke.dedup_by(|a, b| if whole_ticks { a.ticks == b.ticks } else { a.at == b.at });
                 // The last one is never traced; a dot is a point that is never left.
                 stroke.push(place);
                 command(&mut text, "PD", &stroke)?;

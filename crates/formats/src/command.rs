@@ -27,11 +27,16 @@ pub struct Command {
     pub lasts_us: u64,
 }
 
+/// Whether the motors stand still from one instant to the next; a pose that was computed twice may differ in its last bit.
+pub(crate) fn rests(from: &Instant, to: &Instant) -> bool {
+    (0..2).all(|motor| (from.exact[motor] - to.exact[motor]).abs() < 1e-6)
+}
+
 /// The speed of each motor at each instant, ticks/s: central differences of the exact positions, 0 where the motors rest.
 pub(crate) fn speeds(instants: &[Instant]) -> Vec<[f64; 2]> {
     let at = |k: usize| &instants[k];
     let seconds = |a: usize, b: usize| (at(b).row.t_us - at(a).row.t_us) as f64 * 1e-6;
-    let rests = |a: usize, b: usize| at(a).exact == at(b).exact;
+    let rests = |a: usize, b: usize| rests(at(a), at(b));
     (0..instants.len())
         .map(|k| {
             // A plan begins and ends at rest, and rests on both sides of every stretch without motion.

@@ -5,7 +5,7 @@
 
 use std::io::Write;
 
-use crate::command::Instant;
+use crate::command::{Instant, rests};
 use crate::text::Text;
 use crate::{Unfit, WriteError};
 
@@ -24,7 +24,7 @@ pub fn write<W: Write + ?Sized>(
         if let Some(last) = before {
             let lasts = instant.row.t_us - last.row.t_us;
             let periods = lasts / period_us.max(1);
-            if periods * period_us != lasts || periods > 1 && last.exact != instant.exact {
+            if periods * period_us != lasts || periods > 1 && !rests(&last, &instant) {
                 return Err(Unfit::Uneven { row, period_us }.into());
             }
             for _ in 0..periods {

@@ -7,7 +7,7 @@
 use std::io::Write;
 
 use crate::WriteError;
-use crate::command::Instant;
+use crate::command::{Instant, rests};
 use crate::text::Text;
 
 /// Writes a plan. `names` are the joints', `angles` tells which of them are angles.
@@ -35,7 +35,7 @@ pub fn write<W: Write + ?Sized>(
             for joint in 0..2 {
                 let slopes =
                     [(at(k, joint) - at(k - 1, joint)) / before, (at(k + 1, joint) - at(k, joint)) / after];
-                if instants[k - 1].joints != instant.joints && instants[k + 1].joints != instant.joints {
+                if !rests(&instants[k - 1], instant) && !rests(instant, &instants[k + 1]) {
                     velocity[joint] = (before * slopes[1] + after * slopes[0]) / (before + after);
                     acceleration[joint] = 2.0 * (slopes[1] - slopes[0]) / (before + after);
                 }

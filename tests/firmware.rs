@@ -1,0 +1,732 @@
+//! What firmwares make of the files that are written for them: each format is followed by a replayer of that firmware's own
+//! semantics, its defects included, and the ink is held against the drawing by the verifier, or against the plan's own
+//! ticks where nothing may differ.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use assert_cmd::cargo::cargo_bin;
+use drawing::{Affine, Drawing, Rect};
+use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar};
+use plan::{Header, Limits, Row, TickTable};
+use plotplan::machine_file::{MachineFile, PRESETS};
+use sending::Ink;
+use sending::device::{Device, Ebb, Grbl};
+use serde_json::Value;
+use verify::{Certificate, Verifier};
+
+/// The default of `--tolerance`, mm.
+const TOLERANCE: f64 = 0.1;
+/// Motor positions of machines made here, a mm or a degree.
+const FINE: f64 = 1000.0;
+
+type Point = [f64; 2];
+type Lines = Vec<(u16, Vec<Point>)>;
+
+fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn preset(name: &str) -> Machine {
+    let preset = PRESETS.iter().find(|preset| preset.name == name).expect(name);
+    MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a sound preset")
+}
+
+/// Runs convert and gives what it wrote.
+fn convert(file: &str, machine: &str, format: &str, options: &[&str]) -> String {
+    let mut command = Command::new(cargo_bin!("plotplan"));
+    command.current_dir(top()).args(["convert", file, "--machine", machine, "--format", format]);
+    // The single-belt plotter's table is 250 mm wide, and its firmware takes what is below that.
+    let place = if machine == "hbot" { &["--scale", "0.6", "--place", "10mm,10mm"][..] } else { &["--fit"] };
+    command.args(place);
+    let output = command.args(options).output().expect("the program runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{file} {machine} {format}: {said}");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+fn plan(file: &str, machine: &str, options: &[&str]) -> TickTable {
+    let csv = convert(file, machine, "csv", options);
+    formats::read_plan(csv.as_bytes()).expect("a plan").table
+}
+
+/// The drawing where the plan puts it.
+fn placed(file: &str, plan: &TickTable) -> Drawing {
+    let bytes = std::fs::read(top().join(file)).expect("a drawing");
+    let reading = hpgl::read(&bytes, &hpgl::Options::default());
+    let mut drawing = reading.pages[0].drawing.clone();
+    drawing.transform(Affine::new(plan.header.placement));
+    drawing
+}
+
+/// All pens as one, for formats that know no other.
+fn with_one_pen(mut drawing: Drawing) -> Drawing {
+    for stroke in &mut drawing.strokes {
+        stroke.pen = drawing::Pen(1);
+    }
+    drawing
+}
+
+/// A machine that is nothing but a fine ruler: x and y in mm, or angle in degrees and radius.
+fn ruler(geometry: Geometry) -> Machine {
+    let angle = geometry.joint_is_angle()[0];
+    let motor = |name: &str, counts: f64| Motor {
+        name: name.into(),
+        counts,
+        offset: 0.0,
+        max_speed: 1e9,
+        max_acceleration: 1e12,
+        max_jerk: None,
+    };
+    let first = if angle { FINE.to_degrees() } else { FINE };
+    Machine::new(MachineParts {
+        name: "ruler".into(),
+        geometry,
+        joints: [Joint::FREE; 2],
+        min_dexterity: 0.0,
+        coupling: [[1.0, 0.0], [0.0, 1.0]],
+        motors: [motor("a", first), motor("b", FINE)],
+        pen: PenLift { max_speed: 1e9, lift_time: 0.0, drop_time: 0.0 },
+        sheet: Rect::new(0.0, 0.0, 1.0, 1.0),
+        start: Joints::new(0.5, 100.0),
+        period: 0.01,
+    })
+    .expect("a sound machine")
+}
+
+/// Holds ink against a drawing. Places are motor positions of `machine`, times `scale`; limits are nobody's business here.
+fn hold(machine: &Machine, drawing: &Drawing, ink: &Lines, scale: f64) -> Certificate {
+    let limits = Limits { speed: 1e15, acceleration: 1e18, jerk: None };
+    let header = Header {
+        machine: machine.name().into(),
+        motors: machine.motors().clone().map(|motor| plan::Motor { name: motor.name, limits }),
+        placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        period_us: 1_000_000,
+        rows: 0,
+        duration_us: 0,
+    };
+    let mut verifier = Verifier::new(machine, drawing, &header, TOLERANCE);
+    let mut t_us = 0;
+    let mut row = |pen: u16, place: Point| {
+        let ticks = place.map(|value| (value * scale).round() as i64);
+        verifier.row(Row { t_us, pen, ticks }, None);
+        t_us += 1_000_000;
+    };
+    row(0, ink[0].1[0]);
+    for (pen, places) in ink {
+        row(0, places[0]);
+        row(*pen, places[0]);
+        for place in &places[1..] {
+            row(*pen, *place);
+        }
+        row(0, places[places.len() - 1]);
+    }
+    verifier.finish()
+}
+
+/// Fails unless the ink is the drawing, both ways, within so many mm.
+fn within(what: &str, certificate: &Certificate, drawing: &Drawing, most: f64) {
+    within_length(what, certificate, drawing, most, 1.3);
+}
+
+/// The same where motors that go one after the other draw stairs, `stairs` times as long as the drawing at the most.
+fn within_length(what: &str, certificate: &Certificate, drawing: &Drawing, most: f64, stairs: f64) {
+    let off = certificate.after_rounding;
+    assert!(off.max_mm() <= most, "{what}: {off:?}, allowed is {most} mm");
+    let pens: Vec<u16> = drawing.pens().into_iter().map(|pen| pen.0).collect();
+    let mut drawn = certificate.pens.clone();
+    drawn.sort_unstable();
+    assert_eq!(drawn, pens, "{what}: pens");
+    // Not much is drawn twice, either.
+    assert!(certificate.ink_mm < stairs * drawing.length() + 5.0, "{what}: {} mm of ink", certificate.ink_mm);
+}
+
+const DRAWINGS: [&str; 4] = [
+    "examples/house.hpgl",
+    "tests/drawings/arcs.hpgl",
+    "tests/drawings/pens.hpgl",
+    "tests/drawings/dots.hpgl",
+];
+const ONE_STROKE: &str = "examples/zot.hpgl";
+
+/// Seed 1's firmware: what each command does, with both motors on their own way to each set point.
+struct CoaxialFirmware {
+    at: Point,
+    down: bool,
+    pen: u16,
+    ink: Ink,
+    /// Which motor arrives first; nothing if both arrive together.
+    first: Option<usize>,
+}
+
+impl CoaxialFirmware {
+    fn go(&mut self, to: Point) {
+        if let Some(first) = self.first {
+            let mut corner = self.at;
+            corner[first] = to[first];
+            self.ink.go(corner);
+        }
+        self.ink.go(to);
+        self.at = to;
+    }
+
+    fn set(&mut self, down: bool) {
+        self.down = down;
+        self.ink.pen(if down { self.pen } else { 0 }, self.at);
+    }
+
+    /// A file, as its reader takes it: a list of quoted strings a line.
+    fn follow(&mut self, file: &str, point: &dyn Fn(&str) -> Point) {
+        for line in file.lines() {
+            let inner = line.strip_prefix("['").and_then(|rest| rest.strip_suffix("']")).expect(line);
+            let words: Vec<&str> = inner.split("', '").collect();
+            let mut head = words[0].split(';');
+            let mnemonic = head.next().expect("a mnemonic");
+            let count = head.next().expect("a count");
+            let points: Vec<Point> = words[1..].iter().map(|word| point(word)).collect();
+            match mnemonic {
+                "IN" => {}
+                // Neglected by the firmware; here a man puts in the pen.
+                "SP" => self.pen = count.parse().expect("a pen"),
+                "PU" => {
+                    assert_eq!((count.parse(), points.len()), (Ok(1), 1), "{line}");
+                    self.go(points[0]);
+                    self.set(false);
+                }
+                "PD" => {
+                    assert_eq!(count.parse(), Ok(points.len()), "{line}");
+                    self.go(points[0]);
+                    self.set(true);
+                    // Its loop ends one short: the last point is never gone to.
+                    for to in &points[1..points.len() - 1] {
+                        self.go(*to);
+                    }
+                }
+                other => panic!("unknown command {other}"),
+            }
+        }
+    }
+}
+
+fn coaxial_ink(file: &str, start: Point, first: Option<usize>, point: &dyn Fn(&str) -> Point) -> Lines {
+    let mut firmware = CoaxialFirmware { at: start, down: true, pen: 1, ink: Ink::default(), first };
+    firmware.follow(file, point);
+    assert!(!firmware.down, "the pen stays down");
+    firmware.ink.lines()
+}
+
+#[test]
+fn the_coaxial_arm_draws_its_command_file() {
+    let machine = preset("coaxial");
+    for file in DRAWINGS {
+        let plan = plan(file, "coaxial", &[]);
+        let drawing = placed(file, &plan);
+        let commands = convert(file, "coaxial", "coaxial-commands", &[]);
+        let point = |word: &str| {
+            let (a, b) = word.split_once('x').expect("ticks of both arms");
+            [a, b].map(|ticks| ticks.parse::<i64>().expect("whole ticks") as f64)
+        };
+        let start = plan.rows[0].ticks.map(|ticks| ticks as f64);
+        for first in [None, Some(0), Some(1)] {
+            let ink = coaxial_ink(&commands, start, first, &point);
+            let certificate = hold(&machine, &drawing, &ink, 1.0);
+            // Half a tick of both motors, and a whole one of the slower where they do not arrive together.
+            let apart = if first.is_some() { 0.51 } else { 0.02 };
+            let what = format!("{file}, {first:?}");
+            within_length(&what, &certificate, &drawing, TOLERANCE + 0.4536 + apart, 2.5);
+        }
+    }
+}
+
+#[test]
+fn the_command_file_in_inches_says_the_same() {
+    let machine = ruler(Geometry::Cartesian(Cartesian));
+    let sheet = preset("coaxial").sheet();
+    for file in DRAWINGS {
+        let plan = plan(file, "coaxial", &[]);
+        let drawing = placed(file, &plan);
+        let commands = convert(file, "coaxial", "coaxial-commands-inches", &[]);
+        let point = |word: &str| {
+            let inner = word.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).expect(word);
+            let (x, y) = inner.split_once(", ").expect("two numbers");
+            let inches = [x, y].map(|number| number.parse::<f64>().expect("inches"));
+            // From the sheet's upper left corner, y down.
+            [sheet.x0 + 25.4 * inches[0], sheet.y1 - 25.4 * inches[1]]
+        };
+        let ink = coaxial_ink(&commands, [0.0, 0.0], None, &point);
+        within(file, &hold(&machine, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.003);
+    }
+}
+
+/// Seed 2's firmware: it takes y first, turns a place into whole counts of both motors by truncation, and each motor goes
+/// there by itself.
+fn single_belt_ink(file: &str, first: Option<usize>) -> Lines {
+    let mut ink = Ink::default();
+    // Homed, it goes to the middle by itself.
+    let mut at = [3100.0, 3100.0];
+    for line in file.lines() {
+        match line {
+            "P" => ink.pen(1, at),
+            "p" => ink.pen(0, at),
+            _ => {
+                assert!(line.len() < 20, "{line} does not fit into its buffer");
+                let (y, x) = line.split_once(',').expect("two numbers");
+                let number = |text: &str| {
+                    let (whole, tenth) = text.split_once('.').expect("a point");
+                    assert!(
+                        !whole.is_empty() && tenth.len() == 1,
+                        "its parser takes {line} for something else"
+                    );
+                    text.parse::<f64>().expect("a number")
+                };
+                let (x, y) = (number(x), number(y));
+                assert!((0.0..250.0).contains(&x) && (0.0..250.0).contains(&y), "{line} is dropped");
+                let to = [(6200.0 * (x + y) / 500.0).trunc(), (6200.0 * (y - x) / 500.0).trunc() + 3100.0];
+                if let Some(first) = first {
+                    let mut corner = at;
+                    corner[first] = to[first];
+                    ink.go(corner);
+                }
+                ink.go(to);
+                at = to;
+            }
+        }
+    }
+    ink.lines()
+}
+
+#[test]
+fn the_single_belt_plotter_draws_its_lines() {
+    let machine = preset("hbot");
+    for file in DRAWINGS {
+        let plan = plan(file, "hbot", &[]);
+        let drawing = with_one_pen(placed(file, &plan));
+        let lines = convert(file, "hbot", "xy-serial", &[]);
+        for first in [None, Some(0), Some(1)] {
+            let certificate = hold(&machine, &drawing, &single_belt_ink(&lines, first), 1.0);
+            // A tenth of a mm rounded, counts truncated; between two places 0.28 mm apart the motors may go one by one.
+            let apart = if first.is_some() { 0.2 } else { 0.0 };
+            let floor = 0.05 * std::f64::consts::SQRT_2 + 0.0806;
+            let what = format!("{file}, {first:?}");
+            within_length(&what, &certificate, &drawing, TOLERANCE + floor + apart, 2.0);
+        }
+    }
+}
+
+/// Radii and angles of seed 4's table or arrays.
+fn polar_points(text: &str) -> Vec<Point> {
+    if let Some(table) = text.strip_prefix("r,theta,dist\n") {
+        let row = |line: &str| {
+            let mut fields = line.split(',').map(|field| field.parse::<f64>().unwrap_or(0.0));
+            [fields.next().expect("r"), fields.next().expect("theta")]
+        };
+        return table.lines().map(row).collect();
+    }
+    let array = |name: &str| -> Vec<f64> {
+        let begin = text.find(&format!("float {name}[] = {{")).expect(name);
+        let body = text[begin..].split('{').nth(1).and_then(|rest| rest.split('}').next()).expect("numbers");
+        body.split(',').map(|number| number.trim().parse().expect("a number")).collect()
+    };
+    array("radii").into_iter().zip(array("angles")).map(|(r, theta)| [r, theta]).collect()
+}
+
+/// The robot's angle is measured from the left, clockwise; the ruler's from the right.
+fn polar_ink(points: impl Iterator<Item = Point>) -> Lines {
+    vec![(1, points.map(|[r, theta]| [180.0 - theta, r]).collect())]
+}
+
+#[test]
+fn the_polar_robot_draws_its_points() {
+    let machine = ruler(Geometry::Polar(Polar));
+    let plan = plan(ONE_STROKE, "polar", &[]);
+    let drawing = placed(ONE_STROKE, &plan);
+    let table = polar_points(&convert(ONE_STROKE, "polar", "polar-csv", &[]));
+    let arrays = polar_points(&convert(ONE_STROKE, "polar", "c-arrays", &[]));
+    assert_eq!(arrays[arrays.len() - 1], arrays[arrays.len() - 2], "the last point is never sent");
+    // With its 20 steps between neighbours put right: the table's way, to half a servo microsecond's rounding of the plan.
+    let smooth = |points: &[Point]| hold(&machine, &drawing, &polar_ink(points.iter().copied()), FINE);
+    within("table", &smooth(&table), &drawing, TOLERANCE + 0.05 + 0.01);
+    within("arrays", &smooth(&arrays), &drawing, TOLERANCE + 0.05 + 0.03);
+    // As it is written: (j / 20) is 0, so it holds each point but the last, and Servo.write takes whole degrees.
+    let held = arrays[..arrays.len() - 1].iter().map(|[r, theta]| [*r, theta.trunc()]);
+    let certificate = hold(&machine, &drawing, &polar_ink(held), FINE);
+    let degree = 138.0_f64 * 1.0_f64.to_radians();
+    within("as written", &certificate, &drawing, TOLERANCE + 0.05 + 0.03 + degree + 0.1);
+}
+
+/// Feeds a machine its lines, one after the other, and waits for everything to be done.
+fn feed(device: &mut dyn Device, text: &str, end: char) -> Ink {
+    let mut now_us = 0;
+    for line in text.split(['\n', '\r']).filter(|line| !line.is_empty()) {
+        device.answers();
+        device.receive(format!("{line}{end}").as_bytes(), now_us);
+        // Until it has answered: one line is never in its way.
+        loop {
+            let answers = device.answers().concat();
+            let answer = String::from_utf8_lossy(&answers).trim().to_lowercase();
+            assert!(!answer.contains("err"), "`{line}` is answered {answer}");
+            if answer.contains("ok") {
+                break;
+            }
+            now_us = device.wake_us().expect("it does something").max(now_us + 1);
+            device.advance(now_us);
+        }
+    }
+    while let Some(next_us) = device.wake_us() {
+        now_us = next_us.max(now_us + 1);
+        device.advance(now_us);
+    }
+    assert_eq!(device.lost_bytes(), 0);
+    assert!(!device.pen_is_down());
+    device.ink().clone()
+}
+
+/// The plan's ink in ticks, with all pens as one.
+fn planned(plan: &TickTable) -> Lines {
+    let rows: Vec<Row> = plan.rows.iter().map(|row| Row { pen: row.pen.min(1), ..*row }).collect();
+    Ink::of_rows(&rows).lines()
+}
+
+#[test]
+fn an_ebb_loses_and_gains_no_step() {
+    let mut steps = 0;
+    for machine in ["corexy", "hbot", "cartesian"] {
+        for file in DRAWINGS {
+            for period in ["10ms", "7ms", "4130us"] {
+                let plan = plan(file, machine, &["--period", period]);
+                let start = plan.rows[0].ticks.map(|ticks| ticks as f64);
+                for (format, options) in [("ebb", &[][..]), ("ebb-sm", &[]), ("ebb", &["--pen-by", "servo"])]
+                {
+                    let options = [&["--period", period], options].concat();
+                    let text = convert(file, machine, format, &options);
+                    let ink = feed(&mut Ebb::new(), &text, '\r');
+                    let lines: Lines = ink
+                        .lines()
+                        .into_iter()
+                        .map(|(pen, places)| {
+                            (pen, places.into_iter().map(|[a, b]| [a + start[0], b + start[1]]).collect())
+                        })
+                        .collect();
+                    assert_eq!(lines, planned(&plan), "{file} {machine} {format} {period}");
+                }
+                steps +=
+                    plan.rows.windows(2).map(|pair| pair[1].ticks[0].abs_diff(pair[0].ticks[0])).sum::<u64>();
+            }
+        }
+    }
+    assert!(steps > 1_000_000, "{steps} steps are not much of a test");
+}
+
+#[test]
+fn an_ebb_keeps_the_plans_time() {
+    let plan = plan(DRAWINGS[0], "cartesian", &["--period", "4130us"]);
+    let text = convert(DRAWINGS[0], "cartesian", "ebb", &["--period", "4130us"]);
+    let mut said_us = 0;
+    for line in text.split('\r').filter(|line| !line.is_empty()) {
+        let numbers: Vec<i64> = line.split(',').skip(1).map(|word| word.parse().expect("a number")).collect();
+        said_us += match line.split(',').next() {
+            Some("LT") => numbers[0] * 40,
+            Some("SM") => numbers[0] * 1000,
+            Some("SP") => numbers[1] * 1000,
+            _ => 0,
+        };
+    }
+    // Before the plan begins the pen goes up, half a second.
+    let off = said_us - 500_000 - plan.header.duration_us as i64;
+    assert!(off.abs() <= 2000, "{off} us");
+}
+
+/// The words of other flavours in grbl's.
+fn as_grbl(text: &str) -> String {
+    let line = |line: &str| -> Option<String> {
+        let line = line.split(';').next().unwrap_or_default().trim();
+        let last = line.rsplit(['S', '=']).next().unwrap_or_default();
+        if line.is_empty() || line == "M400" {
+            None
+        } else if line.starts_with("M280 P0 S") || line.starts_with("SET_SERVO SERVO=pen ANGLE=") {
+            Some(format!("M3 S{last}"))
+        } else if line == "PAUSE" {
+            Some("M0".to_owned())
+        } else if let Some(ms) = line.strip_prefix("G4 P") {
+            let value: f64 = ms.parse().expect("a time");
+            Some(format!("G4 P{}", if value > 5.0 { value / 1000.0 } else { value }))
+        } else {
+            Some(line.to_owned())
+        }
+    };
+    text.lines().filter_map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn g_code_draws_the_drawing_with_its_arcs() {
+    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    for file in DRAWINGS {
+        let plan = plan(file, "cartesian", &[]);
+        let drawing = with_one_pen(placed(file, &plan));
+        for format in ["gcode-grbl", "gcode-fluidnc", "gcode-marlin", "gcode-klipper"] {
+            for pen in [&[][..], &["--pen-by", "z"], &["--pen-by", "servo", "--pen-positions", "10,70"]] {
+                let text = convert(file, "cartesian", format, pen);
+                assert_eq!(
+                    text.contains("G3 X"),
+                    file.contains("arcs") || file.contains("house"),
+                    "{file}: arcs"
+                );
+                assert!(text.lines().all(|line| line.len() < 80), "{file}: grbl takes 79 characters");
+                let ink = feed(&mut Grbl::new(), &as_grbl(&text), '\n').lines();
+                // Three decimals, the machine's chords of arcs, and chords of ellipses.
+                let certificate = hold(&ruler, &drawing, &ink, FINE);
+                within(&format!("{file} {format} {pen:?}"), &certificate, &drawing, 0.015 + 0.011);
+            }
+        }
+    }
+}
+
+#[test]
+fn timed_g_code_draws_the_plan_in_its_time() {
+    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    for machine in ["cartesian", "coaxial", "polar"] {
+        let file = DRAWINGS[0];
+        let plan = plan(file, machine, &[]);
+        let drawing = with_one_pen(placed(file, &plan));
+        let text = convert(file, machine, "gcode-timed", &[]);
+        let ink = feed(&mut Grbl::new(), &text, '\n').lines();
+        within(machine, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
+        let mut seconds = 0.0;
+        for line in text.lines() {
+            let last = |letter: char| {
+                line.rsplit(letter).next().and_then(|number| number.parse::<f64>().ok()).expect(line)
+            };
+            if line.starts_with("G93") {
+                seconds += 60.0 / last('F');
+            } else if line.starts_with("G4") {
+                seconds += last('P');
+            }
+        }
+        let planned = plan.header.duration_us as f64 * 1e-6;
+        // Ways of less than a micrometre are not said, nor the time that they take.
+        assert!((seconds - planned).abs() < 0.02 * planned, "{machine}: {seconds} s instead of {planned} s");
+    }
+}
+
+#[test]
+fn klipper_makes_every_step_at_its_time() {
+    for (file, machine) in [(DRAWINGS[0], "corexy"), (DRAWINGS[1], "coaxial"), (DRAWINGS[3], "hbot")] {
+        let plan = plan(file, machine, &[]);
+        let text = convert(file, machine, "klipper-steps", &[]);
+        // Clock, motor and direction of every step; clock and state of every pen event.
+        let mut steps: [Vec<(u64, i64)>; 2] = [Vec::new(), Vec::new()];
+        let mut pens: Vec<(u64, bool)> = Vec::new();
+        let (mut clock, mut direction) = ([0_u64; 2], [0_i64; 2]);
+        for line in text.lines().filter(|line| !line.starts_with('#')) {
+            let words: BTreeMap<&str, i64> = line
+                .split(' ')
+                .skip(1)
+                .map(|word| word.split_once('=').expect(line))
+                .map(|(key, value)| (key, value.parse().expect(line)))
+                .collect();
+            let oid = words["oid"] as usize;
+            match line.split(' ').next() {
+                Some("reset_step_clock") => {
+                    // The low half of a clock that only goes on.
+                    let low = words["clock"] as u64;
+                    clock[oid] += low.wrapping_sub(clock[oid]) & 0xFFFF_FFFF;
+                }
+                Some("set_next_step_dir") => direction[oid] = if words["dir"] == 1 { 1 } else { -1 },
+                Some("queue_step") => {
+                    let (interval, count, add) = (words["interval"], words["count"], words["add"]);
+                    assert!((1..1 << 31).contains(&interval) && (1..1 << 16).contains(&count), "{line}");
+                    assert!((-32768..32768).contains(&add), "{line}");
+                    let mut interval = interval;
+                    for _ in 0..count {
+                        clock[oid] += interval as u64;
+                        steps[oid].push((clock[oid], direction[oid]));
+                        interval += add;
+                    }
+                }
+                Some("queue_digital_out") => pens.push((words["clock"] as u64, words["on_ticks"] == 1)),
+                other => panic!("unknown command {other:?}"),
+            }
+        }
+        for (motor, steps) in steps.iter().enumerate() {
+            let mut at = plan.rows[0].ticks[motor];
+            let mut done = steps.iter().peekable();
+            for pair in plan.rows.windows(2) {
+                let (from, to) = (pair[0].t_us * 16, pair[1].t_us * 16);
+                let way = pair[1].ticks[motor] - pair[0].ticks[motor];
+                for k in 0..way.abs() {
+                    let (clock, direction) = *done.next().expect("a step");
+                    assert_eq!(direction, way.signum(), "{file}: direction");
+                    // Where the motor passes the middle between two positions.
+                    let ideal = from as f64 + (k as f64 + 0.5) / way.abs() as f64 * (to - from) as f64;
+                    assert!((clock as f64 - ideal).abs() <= 1.0, "{file}: {clock} instead of {ideal}");
+                    at += direction;
+                }
+                assert_eq!(at, pair[1].ticks[motor], "{file}: motor {motor} at {to}");
+            }
+            assert!(done.next().is_none(), "{file}: steps too many");
+        }
+        let mut down = false;
+        let changes = plan.rows.iter().filter(|row| {
+            let changes = (row.pen != 0) != down;
+            down = row.pen != 0;
+            changes
+        });
+        let expected: Vec<(u64, bool)> =
+            changes.map(|row| ((row.t_us * 16) & 0xFFFF_FFFF, row.pen != 0)).collect();
+        assert_eq!(pens, expected, "{file}: pen");
+    }
+}
+
+/// Ink of samples (pen, pen position), on a ruler.
+fn sampled(samples: impl Iterator<Item = (u16, Point)>) -> Lines {
+    let mut ink = Ink::default();
+    let mut before = 0;
+    for (pen, at) in samples {
+        if before != 0 {
+            ink.go(at);
+        }
+        ink.pen(pen, at);
+        before = pen;
+    }
+    ink.lines()
+}
+
+#[test]
+fn a_trajectory_controller_draws_its_quintics() {
+    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    for name in ["coaxial", "polar", "corexy"] {
+        let machine = preset(name);
+        let plan = plan(DRAWINGS[0], name, &[]);
+        let drawing = with_one_pen(placed(DRAWINGS[0], &plan));
+        let text = convert(DRAWINGS[0], name, "joint-trajectory", &[]);
+        let document: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(document["joint_names"][2], "pen");
+        let points = document["points"].as_array().expect("points");
+        assert_eq!(points.len(), plan.rows.len());
+        let unit = machine.geometry().joint_is_angle().map(|angle| if angle { 1.0 } else { 1000.0 });
+        let value = |point: &Value, what: &str, joint: usize| point[what][joint].as_f64().expect("a number");
+        let time = |point: &Value| {
+            let time = &point["time_from_start"];
+            time["sec"].as_f64().expect("s") + 1e-9 * time["nanosec"].as_f64().expect("ns")
+        };
+        let mut samples = Vec::new();
+        for (index, pair) in points.windows(2).enumerate() {
+            let (from, to) = (&pair[0], &pair[1]);
+            assert!((time(from) * 1e6 - plan.rows[index].t_us as f64).abs() < 0.01);
+            let t = time(to) - time(from);
+            let pen = u16::from(value(from, "positions", 2) > 0.5);
+            for k in 0..4 {
+                let s = f64::from(k) / 4.0;
+                let joints = [0, 1].map(|joint| {
+                    let of = |point: &Value, what: &str| value(point, what, joint) * unit[joint];
+                    let (p0, v0, a0) = (
+                        of(from, "positions"),
+                        of(from, "velocities") * t,
+                        of(from, "accelerations") * t * t,
+                    );
+                    let (p1, v1, a1) =
+                        (of(to, "positions"), of(to, "velocities") * t, of(to, "accelerations") * t * t);
+                    // The quintic with these ends.
+                    let c3 = 10.0 * (p1 - p0) - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1;
+                    let c4 = -15.0 * (p1 - p0) + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1;
+                    let c5 = 6.0 * (p1 - p0) - 3.0 * (v0 + v1) - 0.5 * (a0 - a1);
+                    p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+                });
+                let at = machine.geometry().forward(&Joints::from(joints));
+                samples.push((pen, [at.x, at.y]));
+            }
+        }
+        let ink = sampled(samples.into_iter());
+        // What the quintics swing about the rows comes on top of the tolerance.
+        let c = hold(&ruler, &drawing, &ink, FINE);
+        println!("{name} {:?} {:?}", c.after_rounding, c.failures);
+        within(name, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.02);
+    }
+}
+
+#[test]
+fn streamers_and_servo_drives_draw_the_plan() {
+    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    for name in ["coaxial", "hbot", "polar"] {
+        let machine = preset(name);
+        let at = |ticks: Point| {
+            let p = machine.pen_at(&Joints::from(ticks));
+            [p.x, p.y]
+        };
+        for period in ["1ms", "10ms"] {
+            let options = ["--period", period];
+            let plan = plan(DRAWINGS[0], name, &options);
+            let drawing = with_one_pen(placed(DRAWINGS[0], &plan));
+            let columns = convert(DRAWINGS[0], name, "halstreamer", &options);
+            assert_eq!(columns.lines().count() as u64, plan.header.duration_us / plan.header.period_us + 1);
+            let samples = columns.lines().map(|line| {
+                let numbers: Vec<f64> = line.split(' ').map(|word| word.parse().expect("a number")).collect();
+                (numbers[2] as u16, at([numbers[0], numbers[1]]))
+            });
+            let ink = sampled(samples);
+            let what = format!("{name} {period}");
+            within(&what, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
+
+            let rows = convert(DRAWINGS[0], name, "pvt", &options);
+            let rows: Vec<Vec<f64>> = rows
+                .lines()
+                .skip(1)
+                .map(|line| line.split(',').map(|word| word.parse().expect("a number")).collect())
+                .collect();
+            let samples = rows.windows(2).flat_map(|pair| {
+                let (from, to) = (&pair[0], &pair[1]);
+                let t = to[0] - from[0];
+                (0..4).map(move |k| {
+                    let s = f64::from(k) / 4.0;
+                    // The cubic with these positions and velocities.
+                    let motor = |m: usize| {
+                        let (p0, v0, p1, v1) =
+                            (from[2 + 2 * m], from[3 + 2 * m] * t, to[2 + 2 * m], to[3 + 2 * m] * t);
+                        let (s2, s3) = (s * s, s * s * s);
+                        (2.0 * s3 - 3.0 * s2 + 1.0) * p0
+                            + (s3 - 2.0 * s2 + s) * v0
+                            + (3.0 * s2 - 2.0 * s3) * p1
+                            + (s3 - s2) * v1
+                    };
+                    (u16::from(from[1] > 0.0), [motor(0), motor(1)])
+                })
+            });
+            let ink = sampled(samples.map(|(pen, ticks)| (pen, at(ticks))));
+            within(&what, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
+        }
+    }
+}
+
+/// Runs convert, which has to refuse, and gives why.
+fn refusal(arguments: &[&str]) -> String {
+    let output = Command::new(cargo_bin!("plotplan"))
+        .current_dir(top())
+        .arg("convert")
+        .args(arguments)
+        .output()
+        .expect("the program runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+    assert!(output.stdout.is_empty(), "{arguments:?} writes something");
+    said
+}
+
+#[test]
+fn what_a_format_cannot_say_is_refused_or_told() {
+    let house = DRAWINGS[0];
+    let said = [
+        vec![house, "--fit", "-m", "corexy", "-f", "xy-serial"],
+        vec![house, "--fit", "-m", "corexy", "-f", "coaxial-commands"],
+        vec![house, "--fit", "-m", "coaxial", "-f", "polar-csv"],
+        vec![house, "--fit", "-m", "polar", "-f", "c-arrays"],
+        vec![house, "-m", "hbot", "--fit", "--strict", "-f", "xy-serial"],
+        vec![house, "--fit", "-m", "cartesian", "--period", "37us", "-f", "ebb-sm"],
+    ]
+    .map(|arguments| {
+        let line = refusal(&arguments);
+        let line = line.lines().filter(|line| line.starts_with("error") || line.starts_with("warning"));
+        format!("{}\n{}\n", arguments.join(" "), line.collect::<Vec<_>>().join("\n"))
+    });
+    insta::assert_snapshot!(said.join("\n"));
+}
