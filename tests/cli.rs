@@ -501,6 +501,11 @@ fn checks_and_facts() {
     let desk = Desk::new();
     desk.put("quirk.hpgl", QUIRKS);
     desk.put("two-pages.hpgl", TWO_PAGES);
+    desk.put("nothing.hpgl", "IN;SP1;PU100,100;SP0;");
+    desk.put("lost.hpgl", "IN;SP1;PU0,0;PD400,0,99999999999,0,400,400;PU;");
+    let job =
+        "\x1b%-12345X@PJL ENTER LANGUAGE=HPGL2\n\x1b%-1BBPINPS8400,5940SP1PW.5PU0,0PD400,0PG;\x1b%0A\x1bE";
+    desk.put("job.hpgl", job);
     let said = desk.transcript(&[
         "check tiny.hpgl",
         "check tiny.hpgl --machine polar",
@@ -508,6 +513,11 @@ fn checks_and_facts() {
         "check large.hpgl --machine polar --fit",
         "check quirk.hpgl",
         "check two-pages.hpgl",
+        "check nothing.hpgl",
+        "check lost.hpgl --message-format short",
+        "info job.hpgl",
+        "info quirk.hpgl --message-format short",
+        "info tiny.hpgl --plotter hp7475a --paper a3",
         "info tiny.hpgl",
         "info two-pages.hpgl",
     ]);

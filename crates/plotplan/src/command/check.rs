@@ -39,6 +39,10 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
             None => text.push_str("no ink\n"),
         }
     }
+    if reading.pages.iter().all(|page| page.drawing.is_empty()) {
+        terminal::error("the file draws nothing");
+        refused = true;
+    }
     if let Some(machine) = &machine {
         let drawing = drawn.drawing();
         let request = super::request(&arguments.planning, drawn.page(), &machine.machine);

@@ -1,7 +1,9 @@
-//! `plotplan info`: lengths, pens, bounds, and with a machine the time a drawing takes.
+//! `plotplan info`: what a file is and was read for, lengths, pens, bounds, and with a machine the time a drawing takes.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use hpgl::{Code, Generation, Profile, ProfileReason, Wrappers};
 use plotplan::report::{self, clock, counted, metres};
 
 use crate::cli::Info;
@@ -27,6 +29,12 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     let drawn = input::drawing(input, &arguments.reading)?;
     let reading = &drawn.reading;
     let mut text = format!("drawing  {}\n", input.name);
+    let wrappers = wrappers(reading.summary.wrappers);
+    let _ = writeln!(text, "dialect  {}{wrappers}", generation(reading.summary.generation()));
+    let producer =
+        hpgl::producer(&input.bytes).map_or("not known".into(), |name| format!("looks like {name}"));
+    let _ = writeln!(text, "producer {producer}");
+    text.push_str(&plotter(&reading.summary.profile));
     let used = reading.summary.used.iter().map(|(mnemonic, count)| format!("{mnemonic} {count}"));
     let _ = writeln!(text, "commands {}", reading.summary.commands);
     let _ = writeln!(text, "used     {}", used.collect::<Vec<_>>().join(", "));
@@ -66,6 +74,7 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
             let _ = writeln!(text, "pen {:<4} {}, {}{own}", pen.0, counted(count, "stroke"), metres(length));
         }
     }
+    text.push_str(&told(&reading.diagnostics));
     if let Some(machine) = machine {
         let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
         let compiled = super::convert::compile(input, drawn.drawing(), &machine.machine, &request)?;
@@ -74,6 +83,57 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         text.push_str(&report::certificate_text(&compiled.certificate));
     }
     Ok(text)
+}
+
+fn generation(generation: Generation) -> &'static str {
+    match generation {
+        Generation::HpGl => "HP-GL",
+        Generation::HpGl2 => "HP-GL/2",
+    }
+}
+
+/// What stands around the commands, as the end of a sentence.
+fn wrappers(found: Wrappers) -> String {
+    let names = [
+        (found.device_control, "device control"),
+        (found.pcl, "PCL or RTL"),
+        (found.job_control, "job control (PJL)"),
+    ];
+    let names: Vec<&str> =
+        names.into_iter().filter(|(is_there, _)| *is_there).map(|(_, name)| name).collect();
+    if names.is_empty() { String::new() } else { format!(", with {}", names.join(", ")) }
+}
+
+/// What plotter and paper the file was read for, and why.
+fn plotter(profile: &Profile) -> String {
+    let reason = match profile.reason {
+        ProfileReason::Assumed => "the file names none: HP 7475A with A4",
+        ProfileReason::Options => "as --plotter says",
+        ProfileReason::PaperCode => "HP 7475A: PS names the paper by its code",
+        ProfileReason::HpGl2 => {
+            "HP-GL/2 without the size of its page: HP 7475A with A4, scaling points in its corners"
+        }
+        ProfileReason::PageSize => "PS gives the size of the page",
+        ProfileReason::PictureFrame => "PCL gives the size of the picture frame",
+    };
+    let (p1, p2) = profile.scaling_points;
+    let clip = profile.hard_clip;
+    format!(
+        "plotter  {reason}; unit {} mm\n         reach {}, {} to {}, {}, scaling points {}, {} and {}, {}\n",
+        profile.unit_mm, clip.x0, clip.y0, clip.x1, clip.y1, p1.x, p1.y, p2.x, p2.y
+    )
+}
+
+/// What was passed over or interpreted, one line a kind.
+fn told(diagnostics: &[hpgl::Diagnostic]) -> String {
+    let mut counts: BTreeMap<Code, u64> = BTreeMap::new();
+    for diagnostic in diagnostics {
+        *counts.entry(diagnostic.code).or_default() += diagnostic.count;
+    }
+    let line = |(code, count): (&Code, &u64)| {
+        format!("{:<8} {count} x {code} {}\n", code.severity().to_string(), code.title())
+    };
+    counts.iter().map(line).collect()
 }
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
