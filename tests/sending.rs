@@ -1,0 +1,310 @@
+//! `plotplan send` and `plotplan device` with a real pseudo-terminal between them: every protocol with every mishap, stopped and
+//! gone on with; what the machine drew is the plan, once.
+#![cfg(unix)]
+
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use assert_cmd::cargo::cargo_bin;
+use kinematics::{Joints, Machine};
+use plan::TickTable;
+use plotplan::machine_file::{MachineFile, PRESETS};
+use sending::Ink;
+use tempfile::TempDir;
+
+/// A corner, a circle, a dot.
+const DRAWING: &str = "IN;SP1;PU400,400;PD800,400,800,600;PU600,1000;CI120;PU300,900;PD;PU;";
+const MACHINE: &str = "hbot";
+const PROTOCOLS: [&str; 4] = ["ticks", "xy-serial", "gcode", "ebb"];
+/// How many times faster than the clock the machines live.
+const HASTE: &str = "10";
+
+type Lines = Vec<(u16, Vec<[f64; 2]>)>;
+
+/// A folder with a drawing and its plan.
+struct Desk {
+    folder: TempDir,
+}
+
+impl Desk {
+    fn new(drawing: &str) -> Self {
+        let desk = Self { folder: TempDir::new().expect("a temporary folder") };
+        std::fs::write(desk.path("drawing.hpgl"), drawing).expect("a file can be written");
+        desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-o", "plan.ticks"]);
+        desk
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(cargo_bin!("plotplan"));
+        command.current_dir(self.folder.path()).args(arguments);
+        command
+    }
+
+    fn good(&self, arguments: &[&str]) -> Output {
+        let output = self.command(arguments).output().expect("the program runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "plotplan {}: {said}", arguments.join(" "));
+        output
+    }
+
+    fn plan(&self) -> TickTable {
+        formats::read_plan(&std::fs::read(self.path("plan.ticks")).expect("a plan")).expect("a plan").table
+    }
+
+    /// Starts a machine; its port is `name`.
+    fn device(&self, protocol: &str, name: &str, options: &[&str]) -> Machinery {
+        let ink = format!("{name}.csv");
+        let svg = format!("{name}.svg");
+        let mut command = self.command(&["device", "--protocol", protocol, "--link", name, "-m", MACHINE]);
+        command.args(["--ink", &ink, "--svg", &svg]).args(options).stdout(Stdio::piped());
+        let mut child = command.spawn().expect("the program runs");
+        // It says its name once it can be opened.
+        let mut line = String::new();
+        let out = child.stdout.take().expect("its output");
+        BufReader::new(out).read_line(&mut line).expect("a line");
+        assert_eq!(line.trim_end(), name);
+        Machinery { child, ink: self.path(&ink), svg: self.path(&svg) }
+    }
+
+    fn send(&self, protocol: &str, port: &str, options: &[&str]) -> Command {
+        let mut command = self.command(&["send", "plan.ticks", "--protocol", protocol, "--port", port]);
+        command.args(options);
+        command
+    }
+}
+
+/// A machine that runs.
+struct Machinery {
+    child: Child,
+    ink: PathBuf,
+    svg: PathBuf,
+}
+
+fn interrupt(child: &Child) {
+    let done = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(done.success());
+}
+
+impl Machinery {
+    /// Switches it off and gives what it drew.
+    fn ink(mut self) -> Lines {
+        interrupt(&self.child);
+        assert!(self.child.wait().expect("it ends").success());
+        read_ink(&self.ink)
+    }
+}
+
+fn read_ink(path: &Path) -> Lines {
+    let text = std::fs::read_to_string(path).expect("a table of ink");
+    let mut lines: Lines = Vec::new();
+    for row in text.lines().skip(1) {
+        let fields: Vec<&str> = row.split(',').collect();
+        let line: usize = fields[0].parse().expect("a number");
+        if lines.len() == line {
+            lines.push((fields[1].parse().expect("a pen"), Vec::new()));
+        }
+        lines[line].1.push([2, 3].map(|column: usize| fields[column].parse().expect("a place")));
+    }
+    lines
+}
+
+fn machine() -> Machine {
+    let preset = PRESETS.iter().find(|preset| preset.name == MACHINE).expect(MACHINE);
+    MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a sound preset")
+}
+
+/// What a machine is to draw, in its own units.
+fn wanted(protocol: &str, plan: &TickTable) -> Lines {
+    let machine = machine();
+    let start = plan.rows[0].ticks;
+    let place = |ticks: [i64; 2]| {
+        let at = machine.pen_at(&Joints::from(ticks.map(|ticks| ticks as f64)));
+        let rounded = |unit: f64| [at.x, at.y].map(|mm| (mm * unit).round() / unit);
+        match protocol {
+            "xy-serial" => rounded(10.0),
+            "gcode" => rounded(1000.0),
+            "ebb" => [0, 1].map(|motor| (ticks[motor] - start[motor]) as f64),
+            _ => ticks.map(|ticks| ticks as f64),
+        }
+    };
+    let mut ink = Ink::default();
+    for pair in plan.rows.windows(2) {
+        ink.pen(pair[0].pen, place(pair[0].ticks));
+        ink.go(place(pair[1].ticks));
+    }
+    ink.lines()
+}
+
+#[test]
+fn every_mishap_in_every_protocol_leaves_the_ink_as_planned() {
+    let desk = Desk::new(DRAWING);
+    let plan = desk.plan();
+    // Times are the machine's, which lives ten times as fast.
+    let mishaps = [
+        "none",
+        "lost-answer=40",
+        "late-answer=40:12s",
+        "garbled-answer=40",
+        "full-buffer=2500ms:5s",
+        "unplugged=2500ms:8s",
+    ];
+    thread::scope(|scope| {
+        for protocol in PROTOCOLS {
+            for (number, mishap) in mishaps.into_iter().enumerate() {
+                let (desk, plan) = (&desk, &plan);
+                scope.spawn(move || {
+                    let name = format!("tty-{protocol}-{number}");
+                    let mut options = vec!["--haste", HASTE];
+                    if mishap != "none" {
+                        options.extend(["--fault", mishap]);
+                    }
+                    let device = desk.device(protocol, &name, &options);
+                    let output = desk.send(protocol, &name, &[]).output().expect("the program runs");
+                    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+                    assert!(output.status.success(), "{protocol} {mishap}: {said}");
+                    let svg = device.svg.clone();
+                    assert_eq!(device.ink(), wanted(protocol, plan), "{protocol} {mishap}");
+                    let picture = std::fs::read_to_string(svg).expect("a picture");
+                    assert!(
+                        picture.contains("<path") || picture.contains("<polyline"),
+                        "{protocol} {mishap}"
+                    );
+                });
+            }
+        }
+    });
+}
+
+#[test]
+fn what_is_stopped_by_ctrl_c_is_gone_on_with() {
+    let desk = Desk::new(DRAWING);
+    let plan = desk.plan();
+    thread::scope(|scope| {
+        for protocol in PROTOCOLS {
+            for after_ms in [300, 900, 1500] {
+                let (desk, plan) = (&desk, &plan);
+                scope.spawn(move || {
+                    let what = format!("{protocol} stopped after {after_ms} ms");
+                    let name = format!("tty-{protocol}-{after_ms}");
+                    let device = desk.device(protocol, &name, &["--haste", "2"]);
+                    let sender = desk
+                        .send(protocol, &name, &[])
+                        .stderr(Stdio::piped())
+                        .spawn()
+                        .expect("the program runs");
+                    thread::sleep(Duration::from_millis(after_ms));
+                    interrupt(&sender);
+                    let output = sender.wait_with_output().expect("it ends");
+                    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+                    assert_eq!(output.status.code(), Some(130), "{what}: {said}");
+                    let command = said.lines().last().expect("a command").trim();
+                    let words: Vec<&str> = command.split(' ').skip(1).collect();
+                    assert_eq!(words[words.len() - 2], "--from", "{what}: {said}");
+                    desk.good(&words);
+                    assert_eq!(device.ink(), wanted(protocol, plan), "{what}");
+                });
+            }
+        }
+    });
+}
+
+#[test]
+fn a_port_that_stays_away_is_given_up() {
+    let desk = Desk::new(DRAWING);
+    let device = desk.device("ticks", "tty", &["--haste", HASTE, "--fault", "unplugged=2s:60min"]);
+    let output =
+        desk.send("ticks", "tty", &["--reconnect", "500ms", "--log", "wire.log"]).output().expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("tty has gone away") && said.contains("--from"), "{said}");
+    let log = std::fs::read_to_string(desk.path("wire.log")).expect("a log");
+    assert!(
+        log.contains("> 0:begin 1 ") && log.contains("< ok 1*") && log.contains("! the port has gone away"),
+        "{log}"
+    );
+    drop(device.ink());
+}
+
+#[test]
+fn plans_of_every_format_and_files_of_the_machines_own_words_are_sent() {
+    let desk = Desk::new(DRAWING);
+    desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "csv", "-o", "plan.csv"]);
+    desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "json", "-o", "plan.json"]);
+    desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "gcode-timed", "-o", "plan.gcode"]);
+    desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "xy-serial", "-o", "plan.xy"]);
+    desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "gcode-grbl", "-o", "arcs.gcode"]);
+    let sent = |file: &str, protocol: &str| {
+        let port = format!("tty-{file}-{protocol}");
+        let device = desk.device(protocol, &port, &["--haste", HASTE]);
+        desk.good(&["send", file, "--protocol", protocol, "--port", &port]);
+        device.ink()
+    };
+    let plan = desk.plan();
+    for (file, protocol) in [("plan.csv", "ticks"), ("plan.json", "ebb"), ("plan.json", "gcode")] {
+        assert_eq!(sent(file, protocol), wanted(protocol, &plan), "{file} {protocol}");
+    }
+    // Made of the positions before rounding to ticks: half a tick of both motors off.
+    for (file, protocol) in [("plan.gcode", "gcode"), ("plan.xy", "xy-serial")] {
+        let (drawn, plan) = (sent(file, protocol), wanted(protocol, &plan));
+        assert_eq!(drawn.len(), plan.len(), "{file}");
+        let ends = |lines: &Lines| {
+            lines.iter().flat_map(|(_, line)| [line[0], line[line.len() - 1]]).collect::<Vec<_>>()
+        };
+        for (drawn, planned) in ends(&drawn).into_iter().zip(ends(&plan)) {
+            let off = libm::hypot(drawn[0] - planned[0], drawn[1] - planned[1]);
+            assert!(off < 0.0807 + 0.071, "{file}: {drawn:?} instead of {planned:?}");
+        }
+    }
+    let arcs = sent("arcs.gcode", "gcode");
+    let circle = &arcs[1].1;
+    assert!(circle.iter().all(|[x, y]| (libm::hypot(x - 15.0, y - 25.0) - 3.0).abs() < 0.001), "{circle:?}");
+}
+
+#[test]
+fn machines_that_do_not_answer_get_lines_at_once_or_at_their_time() {
+    let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;");
+    let plan = desk.plan();
+    // At once, as fast as the machine takes them: its pseudo-terminal holds the rest back.
+    let device = desk.device("ticks", "tty-raw", &["--haste", HASTE]);
+    desk.good(&["send", "plan.ticks", "--protocol", "raw", "--port", "tty-raw"]);
+    thread::sleep(Duration::from_secs(1));
+    assert_eq!(device.ink(), wanted("ticks", &plan), "raw");
+    // In time: the sender takes as long as the plan.
+    let device = desk.device("ticks", "tty-paced", &[]);
+    #[allow(clippy::disallowed_methods, reason = "it is about time")]
+    let begun = std::time::Instant::now();
+    desk.good(&["send", "plan.ticks", "--protocol", "paced", "--port", "tty-paced", "--lead", "100ms"]);
+    let took_us = begun.elapsed().as_micros() as u64;
+    assert!(took_us >= plan.header.duration_us, "{took_us} us of {}", plan.header.duration_us);
+    thread::sleep(Duration::from_millis(300));
+    assert_eq!(device.ink(), wanted("ticks", &plan), "paced");
+}
+
+#[test]
+fn what_would_be_sent_is_shown() {
+    let desk = Desk::new("IN;SP1;PU100,100;PD104,100;PU;");
+    let mut shown = String::new();
+    for protocol in PROTOCOLS.into_iter().chain(["paced", "raw"]) {
+        let output = desk.good(&["send", "plan.ticks", "--protocol", protocol, "--dry-run"]);
+        let lines = String::from_utf8(output.stdout).expect("text");
+        let lines: Vec<&str> = lines.lines().collect();
+        let (head, tail) = (lines[..6].join("\n"), lines[lines.len() - 2..].join("\n"));
+        shown.extend([format!("{protocol}: {} lines\n{head}\n...\n{tail}\n\n", lines.len())]);
+    }
+    insta::assert_snapshot!(shown);
+    let output = desk
+        .command(&["send", "plan.ticks", "--protocol", "ticks", "--port", "nosuch"])
+        .output()
+        .expect("runs");
+    assert_eq!(output.status.code(), Some(3));
+    let output = desk.command(&["send", "plan.ticks", "--protocol", "ticks", "--dry-run", "--from", "9999"]);
+    let mut output = output;
+    assert_eq!(output.output().expect("runs").status.code(), Some(2));
+}
