@@ -152,6 +152,9 @@ codes! {
         "SC maps user units to the scaling points P1 and P2, and the file does not say where they are. Those of the plotter \
          named in the options are taken, else of a 7475A with A4 paper, or the corners of the page in HP-GL/2. The size of the \
          drawing hangs on it; its shape does as far as the proportions differ."
+    TOO_MANY_CHORDS = 227 "H0227" Note "arc of needless chords or turns"
+        "An arc asks for chords so short that no plotter could draw them, or goes round more than once. It is drawn smooth; \
+         turns that draw nothing new are drawn once, and the pen ends where the angle says."
 }
 
 #[cfg(test)]

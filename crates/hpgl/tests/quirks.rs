@@ -268,7 +268,7 @@ fn arcs() {
     let chords = ink(&reading(b"IN;SP1;CT1;PA4000,0;PD;AA0,0,90,10;PU;"));
     assert_eq!(chords[0].split(' ').count(), 1 + 1 + 12);
     // Turns beyond the first retrace it; the pen still ends where it should.
-    check(b"IN;SP1;PA400,0;PD;AA0,0,3690;PA0,0;PU;", &["1: 400,0 ~0,400 0,0"], &[]);
+    check(b"IN;SP1;PA400,0;PD;AA0,0,3690;PA0,0;PU;", &["1: 400,0 ~0,400 0,0"], &["H0227"]);
     let ellipse = reading(b"IN;SP1;IP0,0,2000,1000;SC-1,1,-1,1;PA1,0;PD;AA0,0,90;PU;");
     assert_eq!(ink(&ellipse), ["1: 2000,500 ~1000,1000"]);
     // Mirrored: counterclockwise in user units is clockwise on the page.
@@ -579,4 +579,35 @@ fn what_a_file_was_read_for_is_on_record() {
     assert!(summary(b"\x1b.I81;;17:IN;SP1;PD1,2;").wrappers.device_control);
     let named = Options::for_plotter("hp7550a", None).unwrap();
     assert_eq!(read(b"IN;SP1;PD1,2;", &named).summary.profile.reason, ProfileReason::Options);
+}
+
+/// Each of these once was, or could be, a hang, a crash or ink at infinity: it must be told, and the rest of the file drawn.
+#[test]
+fn absurd_numbers_are_told() {
+    for (file, code) in [
+        (&b"IN;SP1;PU0,0;PD99999999999,0;"[..], "H0108"),
+        (b"IN;SP1;PU0,0;PD1e400,0;", "H0108"),
+        (b"IN;SP1;PU0,0;PD1000000000,0;PR1000000000,0;", "H0207"),
+        (b"IN;SP1;SC0,1e-300,0,1;PU0,0;PD1,1;SC;", "H0207"),
+        (b"IN;SP1;SC1,1,0,1;", "H0208"),
+        (b"IN;SP1;SC0,0,0,0,2;", "H0208"),
+        (b"IN;SP1;IP0,0,0,0;SC0,1,0,1;SC;IP;", "H0209"),
+        (b"IN;SP1;IW1,1,1,1;PD100,100;PU;IW;", "H0211"),
+        (b"IN;SP1;PU100,0;PD;AA0,0,1000000000;PU;", "H0227"),
+        (b"IN;SP1;PU100,0;PD;AA0,0,90,0.0000001;PU;", "H0227"),
+        (b"IN;SP1;CT1;PU100,0;CI1000,0.0000000001;", "H0227"),
+        (b"IN;SP1;EW100,0,90,1e-30;", "H0227"),
+        (b"IN;SP1;PU1000000000,0;CI1000000000;", "H0207"),
+        (b"IN;SP1;LT2,0.0000001,1;PU0,0;PD10000,0;PU;LT;", "H0223"),
+        (b"IN;SP1;FT3,0.00001;RA10000,10000;", "H0223"),
+        (b"IN;SP1;SI1e9,1e9;LBx\x03SI;", "H0207"),
+        (b"IN;SP1;PS0,0;", "H0203"),
+    ] {
+        let name = String::from_utf8_lossy(file);
+        let reading = read(&[file, b"PA;PU7000,7000;PD7400,7000;PU;"].concat(), &Options::default());
+        let codes: Vec<&str> = reading.diagnostics.iter().map(|d| d.code.name()).collect();
+        assert!(codes.contains(&code), "{name}: {codes:?}");
+        let last = reading.pages[0].drawing.strokes.last().map(|stroke| (stroke.start(), stroke.end()));
+        assert_eq!(last, Some((Point::new(175.0, 175.0), Point::new(185.0, 175.0))), "{name}");
+    }
 }

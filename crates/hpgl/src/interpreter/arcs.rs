@@ -9,6 +9,9 @@ use crate::codes;
 /// The chord angle of arcs that name none, degrees.
 const DEFAULT_CHORD: f64 = 5.0;
 
+/// Chords of less than this (degrees) are a slip: on the largest sheet they would be shorter than a plotter unit.
+const LEAST_CHORD: f64 = 1e-3;
+
 /// Sine and cosine of an angle in degrees, exact at multiples of 90.
 fn sincos_degrees(degrees: f64) -> (f64, f64) {
     let turn = libm::fmod(degrees, 360.0);
@@ -92,7 +95,7 @@ impl Interpreter {
     /// Plotters draw arcs in chords of 5 degrees by default because they have to, not because anybody wants to see
     /// them: such arcs are smooth here. A chord angle above that is a drawing instruction (CI with 120 is the usual
     /// way to draw a triangle) and is kept.
-    fn chord(&self, parameter: Option<f64>, radius: f64) -> Option<f64> {
+    fn chord(&mut self, parameter: Option<f64>, radius: f64) -> Option<f64> {
         let parameter = parameter?.abs();
         let degrees = if self.chords_by_deviation {
             // A chord of angle c leaves its arc by r (1 - cos(c/2)).
@@ -102,6 +105,12 @@ impl Interpreter {
             libm::fmod(parameter, 360.0)
         };
         let degrees = if degrees > 180.0 { 360.0 - degrees } else { degrees };
+        if 0.0 < degrees && degrees < LEAST_CHORD {
+            let mnemonic = self.mnemonic;
+            self.report(codes::TOO_MANY_CHORDS, || {
+                format!("`{mnemonic}` asks for {:.3e} chords a turn; the arc is smooth", 360.0 / degrees)
+            });
+        }
         (degrees > DEFAULT_CHORD).then_some(degrees)
     }
 
@@ -160,6 +169,15 @@ impl Interpreter {
             return;
         }
         let chord = self.chord(chord, radius);
+        if sweep.abs() > 360.0 {
+            let mnemonic = self.mnemonic;
+            self.report(codes::TOO_MANY_CHORDS, || {
+                format!(
+                    "`{mnemonic}` goes round {:.1} times; turns that draw nothing new are drawn once",
+                    sweep.abs() / 360.0
+                )
+            });
+        }
         self.follow(&arc(center, from, without_idle_turns(sweep), chord));
     }
 
