@@ -17,6 +17,7 @@
 //! | [`joint_trajectory`] | ROS `JointTrajectory` | instants | - |
 //! | [`halstreamer`] | LinuxCNC's streamer columns | instants | - |
 //! | [`pvt`] | position, velocity, time | instants | - |
+//! | [`points`] | seed 4's points `<x, y>` | - | drawing |
 //! | [`svg`] | a drawing as understood | drawing | - |
 //! | [`preview`], [`png`] | a picture of a drawing or a plan on its machine | scene | - |
 //!
@@ -56,6 +57,7 @@ pub mod json;
 pub mod klipper_steps;
 mod palette;
 pub mod png;
+pub mod points;
 pub mod polar_csv;
 mod polar_points;
 pub mod preview;

@@ -9,7 +9,7 @@ use plotplan::quantity;
 /// `plotplan convert drawing.hpgl --machine coaxial` writes the plan to standard output: a table of motor ticks against
 /// time, certified to draw the drawing within a tolerance and inside the motors' limits.
 #[derive(Debug, Parser)]
-#[command(name = "plotplan", version, max_term_width = 100)]
+#[command(name = "plotplan", version = env!("PLOTPLAN_VERSION"), max_term_width = 100)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -344,7 +344,7 @@ pub(crate) enum DeviceProtocol {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Machine {
-    /// List the machines that come with plotplan
+    /// List the machines that come with plotplan, and your own in the configuration folder
     List,
     /// Print a machine as a file that can be changed and given to --machine
     Show {

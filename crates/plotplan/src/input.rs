@@ -1,7 +1,7 @@
 //! Reading files and standard input, drawings and machines.
 
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use drawing::Drawing;
@@ -64,7 +64,13 @@ pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<Drawn, 
         Some(plotter) => hpgl::Options::for_plotter(plotter, arguments.paper.as_deref())
             .ok_or_else(|| Failure::Usage(unknown_plotter(plotter, arguments.paper.as_deref())))?,
     };
-    let reading = hpgl::read(&input.bytes, &options);
+    let reading = if formats::points::looks_like_points(&input.bytes) {
+        let drawing = formats::points::read(&input.bytes);
+        let page = hpgl::Page { drawing, ..hpgl::Page::default() };
+        Reading { pages: vec![page], diagnostics: Vec::new(), ..hpgl::read(b"", &options) }
+    } else {
+        hpgl::read(&input.bytes, &options)
+    };
     terminal::diagnostics(input, &reading.diagnostics, arguments.message_format);
     let pages = reading.pages.len();
     if arguments.page == 0 || arguments.page > pages {
@@ -111,8 +117,31 @@ pub(crate) fn machine(name: &str) -> Result<LoadedMachine, Failure> {
     Ok(LoadedMachine { file, machine })
 }
 
-/// The text of the machine file that a name stands for.
+/// Where the user's own machine files are: `plotplan/machines` in the configuration folder (`XDG_CONFIG_HOME` on Linux).
+fn own_machines() -> Option<PathBuf> {
+    use etcetera::BaseStrategy as _;
+    Some(etcetera::choose_base_strategy().ok()?.config_dir().join("plotplan").join("machines"))
+}
+
+/// Names of the machines in the user's configuration folder, each with its file; in the order of their names.
+pub(crate) fn own_machine_files() -> Vec<(String, PathBuf)> {
+    let entries = own_machines().and_then(|folder| std::fs::read_dir(folder).ok());
+    let paths = entries.into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let mut files: Vec<(String, PathBuf)> = paths
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .filter_map(|path| Some((path.file_stem()?.to_str()?.to_owned(), path)))
+        .collect();
+    files.sort();
+    files
+}
+
+/// The text of the machine file that a name stands for: a file, one of the user's own machines, or a preset.
 pub(crate) fn machine_toml(name: &str) -> Result<String, Failure> {
+    if let Some((_, path)) = own_machine_files().into_iter().find(|(own, _)| own == name) {
+        return std::fs::read_to_string(&path)
+            .with_context(|| format!("cannot read the machine file {}", path.display()))
+            .map_err(Failure::Io);
+    }
     if let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) {
         return Ok(preset.toml.to_owned());
     }
@@ -122,7 +151,9 @@ pub(crate) fn machine_toml(name: &str) -> Result<String, Failure> {
             .with_context(|| format!("cannot read the machine file {name}"))
             .map_err(Failure::Io);
     }
-    let names: Vec<&str> = PRESETS.iter().map(|preset| preset.name).collect();
+    let own = own_machine_files();
+    let names: Vec<&str> =
+        PRESETS.iter().map(|preset| preset.name).chain(own.iter().map(|(name, _)| name.as_str())).collect();
     let hint = nearest(name, names.iter().copied())
         .map_or_else(|| format!("there are {}", names.join(", ")), |near| format!("did you mean {near}?"));
     Err(Failure::Usage(anyhow::anyhow!(

@@ -24,13 +24,10 @@ pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
     output::write("-", |out| out.write_all(text.as_bytes()))
 }
 
-fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
-    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
-    let drawn = input::drawing(input, &arguments.reading)?;
-    let reading = &drawn.reading;
-    let mut text = format!("drawing  {}\n", input.name);
+/// What there is to say about a file of HP-GL, but for its drawing.
+fn language(input: &Input, reading: &hpgl::Reading) -> String {
     let wrappers = wrappers(reading.summary.wrappers);
-    let _ = writeln!(text, "dialect  {}{wrappers}", generation(reading.summary.generation()));
+    let mut text = format!("dialect  {}{wrappers}\n", generation(reading.summary.generation()));
     let producer =
         hpgl::producer(&input.bytes).map_or("not known".into(), |name| format!("looks like {name}"));
     let _ = writeln!(text, "producer {producer}");
@@ -38,6 +35,19 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     let used = reading.summary.used.iter().map(|(mnemonic, count)| format!("{mnemonic} {count}"));
     let _ = writeln!(text, "commands {}", reading.summary.commands);
     let _ = writeln!(text, "used     {}", used.collect::<Vec<_>>().join(", "));
+    text
+}
+
+fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
+    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let drawn = input::drawing(input, &arguments.reading)?;
+    let reading = &drawn.reading;
+    let mut text = format!("drawing  {}\n", input.name);
+    if formats::points::looks_like_points(&input.bytes) {
+        text.push_str("dialect  points <x, y>, mm\n");
+    } else {
+        text.push_str(&language(input, reading));
+    }
     for (number, page) in reading.pages.iter().enumerate() {
         let drawing = &page.drawing;
         if reading.pages.len() > 1 {

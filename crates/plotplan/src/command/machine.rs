@@ -11,10 +11,7 @@ use crate::{input, output, terminal};
 
 pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
     let text = match arguments {
-        Machine::List => PRESETS.iter().fold(String::new(), |mut text, preset| {
-            let _ = writeln!(text, "{:<10} {}", preset.name, preset.about);
-            text
-        }),
+        Machine::List => list(),
         Machine::Show { name } => {
             // Only a machine that can be used is shown.
             input::machine(name)?;
@@ -23,6 +20,19 @@ pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
         Machine::Check { file } => check(file)?,
     };
     output::write("-", |out| out.write_all(text.as_bytes()))
+}
+
+/// The presets, and the user's own machines.
+fn list() -> String {
+    let mut text = String::new();
+    let own = input::own_machine_files();
+    for preset in PRESETS.iter().filter(|preset| own.iter().all(|(name, _)| name != preset.name)) {
+        let _ = writeln!(text, "{:<10} {}", preset.name, preset.about);
+    }
+    for (name, path) in own {
+        let _ = writeln!(text, "{name:<10} your own: {}", path.display());
+    }
+    text
 }
 
 fn check(file: &str) -> Result<String, Failure> {
