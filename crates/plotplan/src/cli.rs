@@ -39,8 +39,8 @@ pub(crate) enum Command {
     Explain(Explain),
     /// Print a completion script for a shell
     Completions(Completions),
-    /// Print the manual page
-    Man,
+    /// Print the manual page of plotplan or of one of its commands
+    Man(Man),
 }
 
 #[derive(Debug, Args)]
@@ -362,6 +362,12 @@ pub(crate) enum Machine {
 pub(crate) struct Explain {
     /// The code, such as H0101; or `plotters` for the plotters and papers that are known
     pub(crate) code: String,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Man {
+    /// The command, such as convert
+    pub(crate) command: Option<String>,
 }
 
 #[derive(Debug, Args)]

@@ -53,8 +53,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             clap_complete::generate(completions.shell, &mut Arguments::command(), "plotplan", &mut &mut *out);
             Ok(())
         }),
-        Command::Man => output::write("-", |out| clap_mangen::Man::new(Arguments::command()).render(out)),
+        Command::Man(man) => manual(man.command.as_deref()),
     }
+}
+
+/// Prints a page of the manual.
+fn manual(command: Option<&str>) -> Result<(), Failure> {
+    let mut all = Arguments::command();
+    all.build();
+    let page = match command {
+        None => all,
+        Some(name) => match all.find_subcommand(name) {
+            // A page of its own is called by its whole name.
+            Some(found) => found.clone().name(format!("plotplan-{name}")),
+            None => return Err(Failure::Usage(anyhow::anyhow!("there is no command {name}"))),
+        },
+    };
+    output::write("-", |out| clap_mangen::Man::new(page).render(out))
 }
 
 /// The request that the command line's words make, for this page on this machine.

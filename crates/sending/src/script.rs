@@ -436,7 +436,7 @@ impl GcodeState {
             return false;
         }
         for word in text.split_ascii_whitespace() {
-            let (letter, number) = word.split_at(1);
+            let Some((letter, number)) = word.split_at_checked(1) else { continue };
             let axis = match letter {
                 "X" => 0,
                 "Y" => 1,
@@ -446,7 +446,9 @@ impl GcodeState {
                 }
                 _ => continue,
             };
-            if let Ok(mm) = number.parse::<f64>() {
+            if let Ok(mm) = number.parse::<f64>()
+                && mm.abs() < 1e9
+            {
                 self.place[axis] = (mm * 1000.0).round() as i64;
                 moved = true;
             }
@@ -469,7 +471,7 @@ impl GcodeState {
         } else {
             let way = [0, 1].map(|axis| (self.place[axis] - from[axis]) as f64 * 1e-3);
             let feed = if text.starts_with("G0") { None } else { self.feed.as_deref() };
-            let feed = feed.and_then(|feed| feed[1..].parse().ok()).unwrap_or(3000.0);
+            let feed = feed.and_then(|feed| feed.strip_prefix('F')?.parse().ok()).unwrap_or(3000.0);
             // A quarter of a circle is 1.11 times its chord.
             1.2 * libm::hypot(way[0], way[1]) * 60.0 / feed
         };

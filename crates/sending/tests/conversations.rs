@@ -2,158 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "plans made here are sound")]
 
-use drawing::Point;
-use formats::{Instant, ebb, gcode};
-use plan::{Header, Limits, Motor, Row, TickTable};
-use sending::asking::Asking;
-use sending::device::{Device, Ebb, Fault, Faulty, Grbl, Ticks, XyPlotter};
-use sending::numbered::Numbered;
-use sending::repeating::Repeating;
-use sending::{Conversation, Ink, Outcome, Script, simulate};
+mod common;
 
-/// Where plans start, ticks.
-const HOME: [i64; 2] = [800, 0];
-const PERIOD_US: u64 = 10_000;
-const DROP_US: u64 = 150_000;
-
-fn limits() -> Limits {
-    Limits { speed: 4000.0, acceleration: 40_000.0, jerk: None }
-}
-
-/// A plan of straight strokes in ticks, each from rest to rest, with travel between them.
-fn plan(strokes: &[(u16, &[[i64; 2]])]) -> TickTable {
-    let mut rows = vec![Row { t_us: 0, pen: 0, ticks: HOME }];
-    let go = |rows: &mut Vec<Row>, to: [i64; 2]| {
-        let from = rows.last().unwrap().ticks;
-        let far = (to[0] - from[0]).abs().max((to[1] - from[1]).abs()) as f64;
-        let seconds = f64::max(1.5 * far / limits().speed, (6.0 * far / limits().acceleration).sqrt());
-        let periods = (seconds * 1e6 / PERIOD_US as f64).ceil() as u64;
-        for k in 1..=periods {
-            let u = k as f64 / periods as f64;
-            let s = u * u * (3.0 - 2.0 * u);
-            let Row { t_us, pen, .. } = *rows.last().unwrap();
-            let ticks = [0, 1].map(|m| from[m] + (s * (to[m] - from[m]) as f64).round() as i64);
-            rows.push(Row { t_us: t_us + PERIOD_US, pen, ticks });
-        }
-    };
-    let pen = |rows: &mut Vec<Row>, pen: u16| {
-        if rows.len() == 1 {
-            let first = rows[0];
-            rows.push(Row { t_us: PERIOD_US, ..first });
-        }
-        let last = rows.last_mut().unwrap();
-        last.pen = pen;
-        let rest = Row { t_us: last.t_us + DROP_US, ..*last };
-        rows.push(rest);
-    };
-    for (number, points) in strokes {
-        go(&mut rows, points[0]);
-        pen(&mut rows, *number);
-        for point in &points[1..] {
-            go(&mut rows, *point);
-        }
-        pen(&mut rows, 0);
-    }
-    go(&mut rows, HOME);
-    let motor = |name: &str| Motor { name: name.into(), limits: limits() };
-    let header = Header {
-        machine: "made up".into(),
-        motors: [motor("a"), motor("b")],
-        placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
-        period_us: PERIOD_US,
-        rows: rows.len() as u64,
-        duration_us: rows.last().unwrap().t_us,
-    };
-    TickTable { header, rows }
-}
-
-/// A square that ends where it began, a zigzag that meets itself, a dot.
-fn drawing() -> TickTable {
-    plan(&[
-        (1, &[[1000, 200], [1300, 200], [1300, 500], [1000, 500], [1000, 200]]),
-        (2, &[[1500, 300], [1600, 450], [1500, 300], [1450, 280], [1500, 300], [1700, 100]]),
-        (1, &[[900, 900]]),
-        (1, &[[905, 905], [915, 905]]),
-    ])
-}
-
-/// Motors straight on x and y, 50 ticks a mm, the plan in the middle of seed 2's range.
-fn instants(table: &TickTable) -> impl Iterator<Item = Instant> + '_ {
-    table.rows.iter().map(|row| {
-        let exact = row.ticks.map(|ticks| ticks as f64);
-        let at = Point::new(60.0 + exact[0] / 50.0, 60.0 + exact[1] / 50.0);
-        Instant { row: *row, exact, joints: [at.x, at.y], at }
-    })
-}
-
-fn options() -> gcode::Options {
-    gcode::Options {
-        flavour: gcode::Flavour::Grbl,
-        pen: gcode::Pen::Servo { up: 40, down: 90 },
-        pen_s: [0.15, 0.15],
-        travel_mm_s: 80.0,
-        chord_mm: 0.01,
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Protocol {
-    Ticks,
-    XySerial,
-    Gcode,
-    Ebb,
-}
-
-const ALL: [Protocol; 4] = [Protocol::Ticks, Protocol::XySerial, Protocol::Gcode, Protocol::Ebb];
-
-impl Protocol {
-    fn script(self, table: &TickTable) -> Script {
-        match self {
-            Self::Ticks => Script::ticks(table.clone()),
-            Self::XySerial => Script::xy_serial(instants(table)).unwrap(),
-            Self::Gcode => Script::gcode(gcode::timed(instants(table), &options(), false)),
-            Self::Ebb => Script::ebb(table.clone(), ebb::Moves::Timed, ebb::Pen::Toggle).unwrap(),
-        }
-    }
-
-    fn converse(self, script: Script) -> Box<dyn Conversation> {
-        match self {
-            Self::Ticks => Box::new(Numbered::new(script, 8)),
-            Self::XySerial => Box::new(Repeating::new(script)),
-            Self::Gcode => Box::new(Asking::new(script, 127)),
-            Self::Ebb => Box::new(Asking::new(script, 0)),
-        }
-    }
-
-    fn device(self) -> Box<dyn Device> {
-        match self {
-            Self::Ticks => Box::new(Ticks::new(Some(HOME))),
-            Self::XySerial => Box::new(XyPlotter::new(false, 0.0)),
-            Self::Gcode => Box::new(Grbl::new()),
-            Self::Ebb => Box::new(Ebb::new()),
-        }
-    }
-
-    /// The ink that is wanted, in the machine's own units, from the plan's rows alone.
-    fn wanted(self, table: &TickTable) -> Vec<(u16, Vec<[f64; 2]>)> {
-        let of = |place: &dyn Fn(&Instant) -> [f64; 2], one_pen: bool| {
-            let mut ink = Ink::default();
-            let all: Vec<Instant> = instants(table).collect();
-            for pair in all.windows(2) {
-                let pen = if one_pen { pair[0].row.pen.min(1) } else { pair[0].row.pen };
-                ink.pen(pen, place(&pair[0]));
-                ink.go(place(&pair[1]));
-            }
-            ink.lines()
-        };
-        match self {
-            Self::Ticks => of(&|i| i.exact, false),
-            Self::XySerial => of(&|i| [i.at.x, i.at.y].map(|mm| (mm * 10.0).round() / 10.0), true),
-            Self::Gcode => of(&|i| [i.at.x, i.at.y].map(|mm| (mm * 1000.0).round() / 1000.0), true),
-            Self::Ebb => of(&|i| [0, 1].map(|m| i.exact[m] - HOME[m] as f64), true),
-        }
-    }
-}
+use common::{ALL, HOME, Protocol, Random, drawing, limits, measure, small};
+use formats::ebb;
+use plan::{Row, TickTable};
+use proptest::prelude::*;
+use sending::device::{Device, Ebb, Fault, Faulty, XyPlotter};
+use sending::{Dialect, Outcome, Script, simulate};
 
 /// Lets it go to its end and gives the ink.
 fn run(protocol: Protocol, table: &TickTable, faults: Vec<Fault>) -> Faulty {
@@ -175,30 +31,6 @@ fn a_plan_is_drawn_as_it_is() {
     for protocol in ALL {
         run(protocol, &drawing(), Vec::new());
     }
-}
-
-/// Numbers that look random and are always the same (Knuth's 64-bit linear congruential generator, upper half).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
-    }
-}
-
-/// How many answers a machine gives to the whole plan, and how long that takes.
-fn measure(protocol: Protocol, table: &TickTable) -> (u64, u64) {
-    let lines = protocol.script(table).steps.len() as u64;
-    let mut machine = Faulty::new(protocol.device(), Vec::new());
-    let mut conversation = protocol.converse(protocol.script(table));
-    let ended = simulate::run(&mut *conversation, &mut machine, 0, None, 3_600_000_000);
-    (lines, ended.at_us)
-}
-
-/// A few short strokes: small enough to try every answer.
-fn small() -> TickTable {
-    plan(&[(1, &[[840, 30], [900, 60], [840, 30]]), (1, &[[830, 40]])])
 }
 
 #[test]
@@ -389,6 +221,68 @@ fn many_mishaps_in_one_plan() {
                 _ => Fault::Unplugged(random.below(lasts_us), random.below(3_000_000)),
             });
             run(protocol, &table, faults.collect());
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn an_ebb_makes_exactly_the_steps_of_any_plan(
+        moves in proptest::collection::vec((0..3_u16, 4_000..60_000_u64, -90..90_i64, -90..90_i64), 1..80),
+        stepper in any::<bool>(),
+    ) {
+        let mut rows = vec![Row { t_us: 0, pen: 0, ticks: HOME }];
+        for (pen, lasts_us, a, b) in moves {
+            let last = rows[rows.len() - 1];
+            // Nothing is moved while the pen is.
+            let (a, b) = if pen == last.pen { (a, b) } else { (0, 0) };
+            rows.push(Row { t_us: last.t_us + lasts_us, pen: last.pen, ticks: [last.ticks[0] + a, last.ticks[1] + b] });
+            let here = rows.len() - 1;
+            rows[here].pen = pen;
+        }
+        let kind = if stepper { ebb::Moves::Stepper } else { ebb::Moves::Timed };
+        let commands = ebb::commands(rows.iter().copied(), kind, ebb::Pen::Toggle).unwrap();
+        let mut board = Ebb::new();
+        let mut now_us = 0;
+        for command in commands {
+            board.receive(format!("{}\r", command.text).as_bytes(), now_us);
+            while let Some(next_us) = board.wake_us() {
+                now_us = next_us;
+                board.advance(now_us);
+            }
+        }
+        board.receive(b"QS\r", now_us);
+        let answers = board.answers().concat();
+        let answers = String::from_utf8_lossy(&answers).into_owned();
+        prop_assert!(!answers.contains("Err"), "{}", answers);
+        let end = rows[rows.len() - 1].ticks;
+        let counters = format!("{},{}\r\n", end[0] - HOME[0], end[1] - HOME[1]);
+        prop_assert!(answers.contains(&counters), "{} in {}", counters, answers);
+    }
+
+    #[test]
+    fn nobody_panics_whatever_is_said(
+        bytes in proptest::collection::vec(any::<u8>(), 0..200),
+        words in proptest::collection::vec("(ok|ok [0-9]{1,3}|at -?[0-9]{1,3} [0-9]{1,3} 0|[01]|<Idle\\|MPos:[0-9.]{1,6},[0-9.]{1,5},0>|QM,[01],0,0|-?[0-9]{1,4},[0-9]{1,4}|error:[0-9]|[GMFXYZ][-0-9.]{1,7}|m [0-9]{1,20} [0-9]{1,20} 1 1|LT,[0-9]{1,3},-?[0-9]{1,10},0,0,0)", 0..30),
+    ) {
+        let text = words.join("\r\n") + "\r\n";
+        for protocol in ALL {
+            let mut conversation = protocol.converse(protocol.script(&small()));
+            let mut device = protocol.device();
+            for (k, said) in [&bytes[..], text.as_bytes(), &bytes[..]].into_iter().enumerate() {
+                let now_us = 3_000_000 * k as u64;
+                conversation.receive(said, now_us);
+                let _ = conversation.transmit(now_us);
+                device.receive(said, now_us);
+                let _ = (device.answers(), conversation.progress());
+            }
+        }
+        for dialect in [Dialect::Gcode, Dialect::XySerial] {
+            let script = Script::of_lines(dialect, &text);
+            for sent in 0..=script.steps.len() {
+                let (_, row) = script.stopping(sent);
+                let _ = script.from_row(row, None);
+            }
         }
     }
 }

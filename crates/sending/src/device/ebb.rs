@@ -14,6 +14,8 @@ const BUFFER: usize = 256;
 /// Moves that wait behind the one that is being done.
 const FIFO: usize = 1;
 const INTERVAL_US: u64 = 40;
+/// The real one takes 32 bits of them; this one is done with a move within the hour.
+const MOST_INTERVALS: i64 = 90_000_000;
 const FULL: i64 = 1 << 31;
 
 #[derive(Clone, Copy, Debug)]
@@ -191,7 +193,9 @@ fn motion(line: &str, up_position: Option<i64>) -> Result<Motion, Option<String>
     let in_range = |rate: i64| rate.abs() < FULL;
     match (verb, &numbers[..]) {
         ("LT", [intervals, r1, a1, r2, a2, rest @ ..])
-            if *intervals > 0 && in_range(*r1) && in_range(*r2) && rest.len() < 2 =>
+            if (1..=MOST_INTERVALS).contains(intervals)
+                && [r1, r2, a1, a2].into_iter().all(|number| in_range(*number))
+                && rest.len() < 2 =>
         {
             Ok(Motion::Timed {
                 intervals: *intervals as u64,
@@ -200,11 +204,13 @@ fn motion(line: &str, up_position: Option<i64>) -> Result<Motion, Option<String>
                 clear: rest.first().map_or(0, |clear| *clear as u8),
             })
         }
-        ("SM", [ms, a, b]) if (1..=16_777_215).contains(ms) => {
+        ("SM", [ms, a, b]) if (1..=16_777_215).contains(ms) && in_range(*a) && in_range(*b) => {
             Ok(Motion::Stepper { ms: *ms as u64, steps: [*a, *b] })
         }
-        ("SP", [value, ms]) if *ms >= 0 => Ok(Motion::Pen { down: *value == 0, ms: *ms as u64 }),
-        ("S2", [position, _, _, ms]) if *ms >= 0 => {
+        ("SP", [value, ms]) if (0..65_536).contains(ms) => {
+            Ok(Motion::Pen { down: *value == 0, ms: *ms as u64 })
+        }
+        ("S2", [position, _, _, ms]) if (0..65_536).contains(ms) => {
             Ok(Motion::Pen { down: up_position.is_some_and(|up| up != *position), ms: *ms as u64 })
         }
         _ => Err(wrong()),

@@ -99,7 +99,7 @@ impl Grbl {
         loop {
             while self.take() {}
             if self.until_us.is_none() {
-                self.until_us = self.blocks.front().map(|block| self.now_us + block.lasts_us);
+                self.until_us = self.blocks.front().map(|block| self.now_us.saturating_add(block.lasts_us));
             }
             let Some(next_us) = self.wake_us().filter(|next_us| *next_us <= now_us) else { break };
             self.now_us = next_us;
@@ -147,8 +147,8 @@ impl Grbl {
         let mut feed = None;
         let line = line.split(';').next().unwrap_or_default();
         for word in line.split_ascii_whitespace() {
-            let (letter, number) = word.split_at(1);
-            let value: f64 = number.parse().map_err(|_| 2_u8)?;
+            let (letter, number) = word.split_at_checked(1).ok_or(1_u8)?;
+            let value: f64 = number.parse().ok().filter(|value: &f64| value.abs() < 1e9).ok_or(2_u8)?;
             match (letter, number) {
                 ("G", "0" | "1" | "2" | "3") => self.motion = value as u8,
                 ("G", "4") => dwell = true,
@@ -169,7 +169,7 @@ impl Grbl {
             }
         }
         if dwell {
-            self.dwell_us = self.now_us + (p * 1e6) as u64;
+            self.dwell_us = self.now_us.saturating_add((p * 1e6) as u64);
             return Ok(());
         }
         if let Some(on) = spindle {

@@ -104,7 +104,7 @@ impl Ticks {
         match self.queue.front().copied() {
             Some(Order::Move { pen, lasts_us, .. }) => {
                 self.set_pen(pen);
-                self.until_us = Some(self.now_us + lasts_us);
+                self.until_us = Some(self.now_us.saturating_add(lasts_us));
                 return true;
             }
             Some(Order::Begin) => self.complete = false,
@@ -158,7 +158,7 @@ impl Ticks {
         // 0 begins a conversation; the same twice does no harm, as nothing else has been taken.
         if number == 0 || number == self.next {
             match self.follow(line) {
-                Ok(()) => self.next = number + 1,
+                Ok(()) => self.next = number.saturating_add(1),
                 Err(why) => {
                     self.answer(&framed(&format!("error {number} {why}")));
                     return;
@@ -195,7 +195,7 @@ impl Ticks {
                 self.queue.push_back(Order::Move { pen: *pen as u16, lasts_us: *lasts_us as u64, to });
                 self.planned = Some(to);
                 self.moves += 1;
-                self.clock_us += *lasts_us as u64;
+                self.clock_us = self.clock_us.saturating_add(*lasts_us as u64);
             }
             ("end", [pen, moves, time]) if *pen >= 0 => {
                 if (*moves, *time) != (self.moves as i64, self.clock_us as i64) {

@@ -133,7 +133,8 @@ impl XyPlotter {
                         next
                     })
                 };
-                let tenth = |mm: f64| (mm * 10.0).round() / 10.0;
+                // Noise may make it less than 0, where the frame is in the way.
+                let tenth = |mm: f64| (mm * 10.0).round().max(0.0) / 10.0;
                 let (y, x) = (tenth(number(&line[..comma])), tenth(number(&line[comma + 1..=last])));
                 if x < RANGE && y < RANGE {
                     let here = self.at(now_us);
