@@ -18,6 +18,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   order DIR     plan every drawing below DIR in the file's order and in ours, on two machines: a table of times
   bench order GENERATOR
                 order the drawings that the script GENERATOR makes (python3 with numpy), beside references
+  bench read [GENERATOR]
+                bytes to drawing: speed, growth and memory, beside hp2xx and a ceiling; of inputs that the script GENERATOR
+                (python3) makes, or of our own
   bench plan [PYTHON]
                 the planner's workload: duration, limits and speed, beside toppra where PYTHON (python3) has it";
 
@@ -29,6 +32,9 @@ fn main() -> ExitCode {
         ["bench", "order", generator] => order::bench(generator.as_ref()),
         ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),
         ["order", folder] => order::real(folder.as_ref()),
+        ["bench", "read"] => bench::read(None),
+        ["bench", "read", generator] => bench::read(Some(generator.as_ref())),
+        ["bench", "read-once", file] => bench::read_once(file.as_ref()),
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),
         _ => {

@@ -1,21 +1,42 @@
 //! Benchmarks: figures beside those of peers, by CPU time.
 
+mod inputs;
 mod plan;
+mod read;
 mod workload;
 
+use std::ffi::OsStr;
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 
-/// `bench plan`; true if all goals were met. Asked for in a debug build, it starts a release build of itself.
+pub(crate) use read::once as read_once;
+
+/// `bench plan`; true if all goals were met.
 pub(crate) fn plan(python: &str) -> Result<bool> {
     if cfg!(debug_assertions) {
-        let mut again = Command::new(env!("CARGO"));
-        again.args(["run", "--quiet", "--release", "--package", "xtask", "--", "bench", "plan", python]);
-        return Ok(again.current_dir(crate::top()).status().context("cargo run --release")?.success());
+        return released(&["plan".as_ref(), python.as_ref()]);
     }
     plan::run(python)
+}
+
+/// `bench read`; true if all goals were met.
+pub(crate) fn read(generator: Option<&Path>) -> Result<bool> {
+    if cfg!(debug_assertions) {
+        let generator = generator.map(std::path::absolute).transpose()?;
+        let arguments = generator.iter().map(AsRef::as_ref);
+        return released(&std::iter::once("read".as_ref()).chain(arguments).collect::<Vec<&OsStr>>());
+    }
+    read::run(generator)
+}
+
+/// A release build of this program, asked for the same.
+fn released(arguments: &[&OsStr]) -> Result<bool> {
+    let mut again = Command::new(env!("CARGO"));
+    again.args(["run", "--quiet", "--release", "--package", "xtask", "--", "bench"]).args(arguments);
+    Ok(again.current_dir(crate::top()).status().context("cargo run --release")?.success())
 }
 
 /// What `work` gives, and the CPU time that it takes, s: the least of three rounds, because other programs on this
