@@ -233,6 +233,38 @@ fn a_port_that_stays_away_is_given_up() {
 }
 
 #[test]
+fn what_was_given_up_is_gone_on_with_from_where_the_machine_is() {
+    let desk = Desk::new(DRAWING);
+    let plan = desk.plan();
+    thread::scope(|scope| {
+        for protocol in ["ticks", "gcode", "ebb"] {
+            for at in ["1500ms", "2500ms", "3700ms"] {
+                let (desk, plan) = (&desk, &plan);
+                scope.spawn(move || {
+                    let what = format!("{protocol} unplugged at {at}");
+                    let name = format!("tty-{protocol}-{at}");
+                    // Away for half a second of ours; it does what it was told meanwhile.
+                    let device = desk.device(
+                        protocol,
+                        &name,
+                        &["--haste", "2", "--fault", &format!("unplugged={at}:1s")],
+                    );
+                    let output =
+                        desk.send(protocol, &name, &["--reconnect", "100ms"]).output().expect("runs");
+                    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+                    assert_eq!(output.status.code(), Some(3), "{what}: {said}");
+                    thread::sleep(Duration::from_secs(2));
+                    let words: Vec<&str> =
+                        said.lines().last().expect("a command").trim().split(' ').skip(1).collect();
+                    desk.good(&words);
+                    assert_eq!(device.ink(), wanted(protocol, plan), "{what}: {said}");
+                });
+            }
+        }
+    });
+}
+
+#[test]
 fn plans_of_every_format_and_files_of_the_machines_own_words_are_sent() {
     let desk = Desk::new(DRAWING);
     desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "csv", "-o", "plan.csv"]);

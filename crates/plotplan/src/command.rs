@@ -64,8 +64,8 @@ fn manual(command: Option<&str>) -> Result<(), Failure> {
     let page = match command {
         None => all,
         Some(name) => match all.find_subcommand(name) {
-            // A page of its own is called by its whole name.
-            Some(found) => found.clone().name(format!("plotplan-{name}")),
+            // It was built as part of the whole, and knows its whole name.
+            Some(found) => found.clone(),
             None => return Err(Failure::Usage(anyhow::anyhow!("there is no command {name}"))),
         },
     };

@@ -18,7 +18,7 @@ const ASK_AGAIN_US: u64 = 200_000;
 /// Questions without any answer before giving up.
 const TRIES: u32 = 60;
 /// Where grbl says it is, is its steps': half a step off, micrometres. 25 steps/mm are the coarsest that this holds for.
-const BLUR_UM: u64 = 20;
+pub(crate) const BLUR_UM: u64 = 20;
 /// An EBB answers `OK` to a question, too: so long it may take.
 const STRAY_OK_US: u64 = 300_000;
 
@@ -140,30 +140,11 @@ impl Asking {
         if line.starts_with("error") || line.starts_with("ALARM") {
             return Answer::Refused(line.to_owned());
         }
-        let Some(report) = line.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) else {
-            return Answer::Other;
-        };
-        let mut words = report.split('|');
-        let state = words.next().unwrap_or_default();
-        let mut place = None;
-        for word in words {
-            if let Some(offset) = word.strip_prefix("WCO:").and_then(micrometres) {
-                self.offset = offset;
-            } else if let Some(at) = word.strip_prefix("MPos:").and_then(micrometres) {
-                place = Some((at, true));
-            } else if let Some(at) = word.strip_prefix("WPos:").and_then(micrometres) {
-                place = Some((at, false));
-            }
-        }
-        if state.starts_with("Alarm") {
+        if line.starts_with("<Alarm") {
             return Answer::Refused("the machine is in alarm: home it or unlock it first".to_owned());
         }
-        match place {
-            Some((at, machine)) => {
-                let offset = if machine { self.offset } else { [0; 2] };
-                let place = [at[0] - offset[0], at[1] - offset[1]];
-                Answer::Standing { place, moving: state != "Idle" }
-            }
+        match grbl_report(line, &mut self.offset) {
+            Some((place, moving)) => Answer::Standing { place, moving },
             None => Answer::Other,
         }
     }
@@ -391,9 +372,28 @@ fn pair(line: &str) -> Option<[i64; 2]> {
     Some([a.trim().parse().ok()?, b.trim().parse().ok()?])
 }
 
+/// Where grbl stands in work coordinates, micrometres, and whether it moves, of a report such as `<Idle|MPos:1.000,2.000,0.000|...>`.
+/// The offset of work coordinates comes with some reports only.
+pub(crate) fn grbl_report(line: &str, offset: &mut [i64; 2]) -> Option<([i64; 2], bool)> {
+    let mut words = line.strip_prefix('<')?.strip_suffix('>')?.split('|');
+    let moving = words.next()? != "Idle";
+    let (mut machine, mut work) = (None, None);
+    for word in words {
+        if let Some(at) = word.strip_prefix("WCO:").and_then(micrometres) {
+            *offset = at;
+        } else if let Some(at) = word.strip_prefix("MPos:").and_then(micrometres) {
+            machine = Some(at);
+        } else if let Some(at) = word.strip_prefix("WPos:").and_then(micrometres) {
+            work = Some(at);
+        }
+    }
+    let place = work.or(machine.map(|at| [0, 1].map(|axis| at[axis] - offset[axis])))?;
+    Some((place, moving))
+}
+
 /// x and y of `X,Y,Z` in mm.
 fn micrometres(text: &str) -> Option<[i64; 2]> {
-    let mut words = text.split(',').map(|word| word.parse::<f64>().ok().filter(|mm| mm.is_finite()));
+    let mut words = text.split(',').map(|word| word.parse::<f64>().ok().filter(|mm| mm.abs() < 1e9));
     let mut next = || Some((words.next()?? * 1000.0).round() as i64);
     Some([next()?, next()?])
 }

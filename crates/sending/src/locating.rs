@@ -1,5 +1,6 @@
-//! Asking a machine where its motors are, before a plan is gone on with.
+//! Asking a machine where it stands, before a plan is gone on with.
 
+use crate::asking::grbl_report;
 use crate::conversation::{Lines, framed, unframed};
 use crate::script::Dialect;
 
@@ -11,7 +12,7 @@ const TRIES: u32 = 10;
 /// What the machine says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Located {
-    /// Its motors rest there: ticks, or steps from where they were switched on.
+    /// It rests there: ticks, steps from where the motors were switched on, or micrometres.
     At([i64; 2]),
     /// It does not know: nothing has been sent to it since it was homed.
     Unknown,
@@ -19,10 +20,13 @@ pub enum Located {
     Silent,
 }
 
-/// The question, in the words of tick lines or of an EBB.
+/// The question.
 #[derive(Debug)]
 pub struct Locating {
-    ebb: bool,
+    dialect: Dialect,
+    /// Where grbl was idle when it was last asked.
+    stood: Option<[i64; 2]>,
+    offset: [i64; 2],
     lines: Lines,
     tries: u32,
     again_us: u64,
@@ -31,26 +35,47 @@ pub struct Locating {
 }
 
 impl Locating {
-    /// For machines of this dialect: [`Dialect::Ticks`] or [`Dialect::Ebb`].
+    /// For machines of this dialect, which is one that can be asked.
     pub fn new(dialect: Dialect) -> Self {
-        let ebb = matches!(dialect, Dialect::Ebb(..));
-        Self { ebb, lines: Lines::default(), tries: 0, again_us: 0, moving: true, found: None }
+        Self {
+            dialect,
+            stood: None,
+            offset: [0; 2],
+            lines: Lines::default(),
+            tries: 0,
+            again_us: 0,
+            moving: true,
+            found: None,
+        }
     }
 
     /// Bytes have come in.
     pub fn receive(&mut self, bytes: &[u8]) {
         for line in self.lines.add(bytes) {
             self.tries = 0;
-            if self.ebb {
-                if let Some(state) = line.strip_prefix("QM,") {
-                    self.moving = state.split(',').any(|word| word != "0");
-                } else if let Some((a, b)) = line.split_once(',')
-                    && let (Ok(a), Ok(b)) = (a.parse(), b.parse())
-                    && !self.moving
-                {
-                    self.found = Some(Located::At([a, b]));
+            match self.dialect {
+                Dialect::Ebb(..) => {
+                    if let Some(state) = line.strip_prefix("QM,") {
+                        self.moving = state.split(',').any(|word| word != "0");
+                    } else if let Some((a, b)) = line.split_once(',')
+                        && let (Ok(a), Ok(b)) = (a.parse(), b.parse())
+                        && !self.moving
+                    {
+                        self.found = Some(Located::At([a, b]));
+                    }
+                    continue;
                 }
-                continue;
+                Dialect::Gcode => {
+                    if let Some((place, moving)) = grbl_report(&line, &mut self.offset) {
+                        // It may be idle between two lines: it has to be so twice.
+                        if !moving && self.stood == Some(place) {
+                            self.found = Some(Located::At(place));
+                        }
+                        self.stood = (!moving).then_some(place);
+                    }
+                    continue;
+                }
+                _ => {}
             }
             let Some(text) = unframed(&line) else { continue };
             let words: Vec<&str> = text.split(' ').collect();
@@ -77,7 +102,11 @@ impl Locating {
             return Vec::new();
         }
         self.again_us = now_us + AGAIN_US;
-        if self.ebb { b"\rQM\rQS\r".to_vec() } else { format!("\n{}\n", framed("where")).into_bytes() }
+        match self.dialect {
+            Dialect::Ebb(..) => b"\rQM\rQS\r".to_vec(),
+            Dialect::Gcode => b"?".to_vec(),
+            _ => format!("\n{}\n", framed("where")).into_bytes(),
+        }
     }
 
     /// When it wants to be asked again.

@@ -18,6 +18,9 @@ pub struct Step {
     pub place: Option<[i64; 2]>,
 }
 
+/// So many lines may have been taken by a machine before it was heard of.
+const UNANSWERED: usize = 64;
+
 /// How lines are made of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dialect {
@@ -329,6 +332,27 @@ impl Script {
         }
         steps.extend_from_slice(&self.steps[done..]);
         Ok(Self { steps, ..self.clone() })
+    }
+
+    /// The row at which a machine is that says it stands at `place`, if that is row `from` or one of those that may have been
+    /// done after it without an answer. The place is in the unit in which the dialect says it.
+    pub fn standing_row(&self, from: u64, place: [i64; 2]) -> Option<u64> {
+        if let Some(table) = &self.table {
+            let start = if matches!(self.dialect, Dialect::Ebb(..)) { self.start } else { [0; 2] };
+            let rows = table.rows.iter().zip(0..).skip(from as usize).take(UNANSWERED);
+            let at = |row: &Row| [0, 1].map(|motor| row.ticks[motor] - start[motor]);
+            return rows.into_iter().find(|(row, _)| at(row) == place).map(|(_, index)| index);
+        }
+        let mut here = None;
+        let near = |at: [i64; 2]| (0..2).all(|axis| at[axis].abs_diff(place[axis]) <= crate::asking::BLUR_UM);
+        let mut found: Option<u64> = None;
+        for step in self.steps.iter().take_while(|step| step.row <= from + UNANSWERED as u64) {
+            here = step.place.or(here);
+            if step.row >= from && here.is_some_and(near) {
+                found = found.or(Some(step.row));
+            }
+        }
+        found
     }
 
     /// What follows instead after the first `sent` lines so that the machine comes to rest with the pen up, and the row

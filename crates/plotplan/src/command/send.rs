@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let input = input::read(&arguments.plan)?;
     let script = script(arguments, &input)?;
     if arguments.dry_run {
-        let script = started(arguments, &script, None)?;
+        let script = started(arguments, &script)?;
         return dry_run(arguments, &script);
     }
     let Some(path) = &arguments.port else {
@@ -64,26 +64,23 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
         ),
     };
     let mut wire = Wire { settings, events, port: Some(port), number: 0, log, begun: now(), lost_at: None };
-    let standing = match (arguments.from, script.dialect) {
-        (Some(_), Dialect::Ticks | Dialect::Ebb(..)) if !is_blind(arguments.protocol) => {
-            wire.locate(&script)?
-        }
-        _ => None,
+    let script = match arguments.from {
+        Some(row) if can_be_asked(arguments.protocol) => wire.go_on(&script, row)?,
+        _ => started(arguments, &script)?,
     };
-    let script = started(arguments, &script, standing)?;
     let mut conversation = conversation(arguments, script);
     let outcome = wire.talk(&mut *conversation, arguments.reconnect);
     report(&outcome, &*conversation)
 }
 
-fn is_blind(protocol: Protocol) -> bool {
-    matches!(protocol, Protocol::Raw | Protocol::Paced)
+fn can_be_asked(protocol: Protocol) -> bool {
+    matches!(protocol, Protocol::Ticks | Protocol::Ebb | Protocol::Gcode)
 }
 
 /// The script from where it is to begin.
-fn started(arguments: &Send, script: &Script, standing: Option<[i64; 2]>) -> Result<Script, Failure> {
+fn started(arguments: &Send, script: &Script) -> Result<Script, Failure> {
     let Some(row) = arguments.from else { return Ok(script.clone()) };
-    script.from_row(row, standing).map_err(|error| Failure::Usage(error.into()))
+    script.from_row(row, None).map_err(|error| Failure::Usage(error.into()))
 }
 
 /// What is to be said: the lines of a plan, or those of a file in the machine's own words.
@@ -220,7 +217,27 @@ impl Wire {
         }
     }
 
-    /// Asks where the motors are: in ticks.
+    /// The rest of the script from `row` on, or from where the machine says it is, if that is a little further.
+    fn go_on(&mut self, script: &Script, row: u64) -> Result<Script, Failure> {
+        let usage = |error: sending::ScriptError| Failure::Usage(error.into());
+        // A row that there is not is no reason to ask anybody.
+        script.from_row(row, None).map_err(usage)?;
+        let start = script.start();
+        let (place, standing) = match self.locate(script)? {
+            None => (None, start),
+            Some(at) if matches!(script.dialect, Dialect::Ebb(..)) => {
+                (Some(at), [0, 1].map(|motor| start[motor] + at[motor]))
+            }
+            Some(at) => (Some(at), at),
+        };
+        let found = place.and_then(|place| script.standing_row(row, place));
+        if let Some(found) = found.filter(|found| *found != row) {
+            terminal::say(&format!("the machine has come to row {found}: it goes on from there\n"));
+        }
+        script.from_row(found.unwrap_or(row), Some(standing)).map_err(usage)
+    }
+
+    /// Asks where the machine stands; nothing if it has been homed and does not know yet.
     fn locate(&mut self, script: &Script) -> Result<Option<[i64; 2]>, Failure> {
         let mut question = Locating::new(script.dialect);
         loop {
@@ -229,14 +246,10 @@ impl Wire {
                 self.write(&bytes);
             }
             match question.found() {
-                Some(Located::At(at)) => {
-                    let start = script.start();
-                    let counts_from_start = matches!(script.dialect, Dialect::Ebb(..));
-                    return Ok(Some([0, 1].map(|m| at[m] + if counts_from_start { start[m] } else { 0 })));
-                }
-                Some(Located::Unknown) => return Ok(Some(script.start())),
+                Some(Located::At(at)) => return Ok(Some(at)),
+                Some(Located::Unknown) => return Ok(None),
                 Some(Located::Silent) => {
-                    let what = "the machine does not answer where its motors are";
+                    let what = "the machine does not answer where it stands";
                     return Err(Failure::Io(anyhow::anyhow!(what)));
                 }
                 None => {}
