@@ -155,6 +155,9 @@ codes! {
     TOO_MANY_CHORDS = 227 "H0227" Note "arc of needless chords or turns"
         "An arc asks for chords so short that no plotter could draw them, or goes round more than once. It is drawn smooth; \
          turns that draw nothing new are drawn once, and the pen ends where the angle says."
+    PEN_ZERO_DRAWS = 228 "H0228" Note "pen 0 with a colour"
+        "Pen 0 is no pen on a pen plotter. On a plotter with a palette it is a colour like any other: white, until PC makes it \
+         another one, as AutoCAD's driver does. Then it is drawn, with the first pen number that the file does not use."
 }
 
 #[cfg(test)]

@@ -611,3 +611,15 @@ fn absurd_numbers_are_told() {
         assert_eq!(last, Some((Point::new(175.0, 175.0), Point::new(185.0, 175.0))), "{name}");
     }
 }
+
+/// AutoCAD's driver numbers its colours from 0 on; a file of its lost a good part of its ink.
+#[test]
+fn pen_zero_with_a_colour_draws() {
+    let palette = b"BPIN;NP8;PC0,0,255,255;SP0;PU0,0;PD400,0;SP1;PU0,40;PD400,40;PU;";
+    check(palette, &["2: 0,0 400,0", "1: 0,40 400,40"], &["H0228"]);
+    let late = b"BPIN;SP0;PU0,0;PD400,0;PC0,0,0,255;SP1;PU0,40;PD400,40;PU;";
+    check(late, &["2: 0,0 400,0", "1: 0,40 400,40"], &["H0228"]);
+    // White on white is none.
+    let white = b"BPIN;PC0,255,255,255;SP0;PU0,0;PD400,0;SP1;PU0,40;PD400,40;PU;";
+    check(white, &["1: 0,40 400,40"], &["H0202"]);
+}

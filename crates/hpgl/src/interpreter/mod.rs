@@ -216,6 +216,7 @@ impl Interpreter {
             b"AS" => self.pen_acceleration(p),
             b"PW" => self.pen_width(p),
             b"WU" => self.width_unit(p),
+            b"PC" => self.pen_colour(p),
             b"SP" => self.select_pen(p),
             b"IN" => self.initialise(),
             b"DF" => self.set_defaults(),
@@ -290,7 +291,7 @@ impl Interpreter {
     }
 
     fn hold(&mut self, pen: u16) {
-        self.holder = if pen == 0 { Holder::Empty } else { Holder::Holds(pen) };
+        self.holder = if pen == 0 && !self.pens.zero_draws { Holder::Empty } else { Holder::Holds(pen) };
         self.tracer.set_pen(Pen(pen));
         self.pens.touch();
     }
@@ -325,6 +326,10 @@ impl Interpreter {
     /// Ink that was drawn after `SP0` is none, unless there is no other in the whole file: then a pen in the holder is
     /// meant.
     fn settle_ink_of_no_pen(&mut self) {
+        if self.pens.zero_draws {
+            self.number_pen_zero();
+            return;
+        }
         if !self.findings.has(codes::PEN_PUT_AWAY) {
             return;
         }

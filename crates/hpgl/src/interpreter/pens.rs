@@ -1,9 +1,9 @@
 //! What the file says about its pens: `VS FS AS PW WU`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Holder, Interpreter};
-use crate::PenSettings;
+use crate::{PenSettings, codes};
 use drawing::Pen;
 
 /// Settings for all pens, and for single ones.
@@ -17,6 +17,8 @@ pub(crate) struct Pens {
     used: BTreeMap<Pen, PenSettings>,
     /// Nothing has changed since the last ink.
     noted: bool,
+    /// The file gives pen 0 a colour: it is a pen like the others.
+    pub(super) zero_draws: bool,
 }
 
 impl Pens {
@@ -110,6 +112,41 @@ impl Interpreter {
         let width = p.first().filter(|&&width| width > 0.0).map(|width| width * unit);
         self.pens.set(p.get(1).copied(), |settings| settings.width_mm = width);
         self.apply_line_type();
+    }
+
+    /// `PC`: a colour of the palette. Which one matters for pen 0 only, the colour of the paper unless it is told another.
+    pub(super) fn pen_colour(&mut self, p: &[f64]) {
+        const WHITE: f64 = 255.0;
+        if let [0.0, red, green, blue, ..] = *p
+            && red.min(green).min(blue) < WHITE
+        {
+            self.pens.zero_draws = true;
+            if self.holder == Holder::Empty {
+                self.hold(0);
+            }
+        }
+    }
+
+    /// Gives what pen 0 drew to the first pen that draws nothing else.
+    pub(super) fn number_pen_zero(&mut self) {
+        let used: BTreeSet<Pen> = self.pages.iter().flat_map(|page| page.drawing.pens()).collect();
+        if !used.contains(&Pen(0)) {
+            return;
+        }
+        let number = (1..=u16::MAX).find(|&number| !used.contains(&Pen(number))).unwrap_or(1);
+        for page in &mut self.pages {
+            for stroke in page.drawing.strokes.iter_mut().filter(|stroke| stroke.pen == Pen(0)) {
+                stroke.pen = Pen(number);
+            }
+            let settings = page.pens.remove(&Pen(0));
+            page.pens.extend(settings.map(|settings| (Pen(number), settings)));
+        }
+        let message = move || format!("the file gives pen 0 a colour: it is drawn as pen {number}");
+        if self.findings.has(codes::PEN_PUT_AWAY) {
+            self.findings.recode(codes::PEN_PUT_AWAY, codes::PEN_ZERO_DRAWS, message);
+        } else {
+            self.report(codes::PEN_ZERO_DRAWS, message);
+        }
     }
 
     /// `WU`: what widths are measured in; widths set before are forgotten.
