@@ -199,3 +199,28 @@ fn covers(corners: &[(i32, i32)], x: f64, y: f64) -> bool {
     }
     inside
 }
+
+/// HP's manual of PCL 5 (LT) lists the commands after which the rest of a pattern is forgotten; lifting the pen is none of them.
+#[test]
+fn line_patterns_begin_anew_after_some_commands() {
+    for (between, anew) in [
+        ("PU;", false),
+        ("EA400,400;", false),
+        ("SP1;", true),
+        ("AC;", true),
+        ("LA1,2;", true),
+        ("TR1;", true),
+        ("RF;", true),
+        ("PW.5;", true),
+        ("WU;", true),
+        ("UL;", true),
+        ("IP;", true),
+    ] {
+        // 10 mm a pattern, half of it ink; the first line ends 2.5 mm into its second stroke.
+        let file = format!("IN;SP1;LT2,10,1;PU0,0;PD500,0;{between}PU0,4000;PD400,4000;PU;");
+        let reading = read(file.as_bytes(), &Options::default());
+        let upper = reading.pages[0].drawing.strokes.iter().find(|stroke| stroke.start().y == 100.0);
+        let end = upper.map(|stroke| stroke.end().x);
+        assert_eq!(end, Some(if anew { 5.0 } else { 2.5 }), "{between}");
+    }
+}

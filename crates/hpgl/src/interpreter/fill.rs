@@ -108,6 +108,7 @@ impl Interpreter {
             [x, y, ..] => self.frame.plu_of_user(Point::new(x, y)),
             _ => Point::ZERO,
         };
+        self.apply_line_type();
     }
 
     /// `PT`: how thick the pen is, mm.

@@ -217,6 +217,8 @@ impl Interpreter {
             b"PW" => self.pen_width(p),
             b"WU" => self.width_unit(p),
             b"PC" => self.pen_colour(p),
+            // They have no effect on ink but that line patterns begin anew.
+            b"LA" | b"RF" | b"TR" => self.apply_line_type(),
             b"SP" => self.select_pen(p),
             b"IN" => self.initialise(),
             b"DF" => self.set_defaults(),

@@ -215,6 +215,7 @@ impl Interpreter {
             return;
         }
         self.hold(number as u16);
+        self.apply_line_type();
     }
 
     /// `CT`: what the chord parameter of arcs is.
