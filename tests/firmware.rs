@@ -730,3 +730,18 @@ fn what_a_format_cannot_say_is_refused_or_told() {
     });
     insta::assert_snapshot!(said.join("\n"));
 }
+
+#[test]
+fn the_documentation_names_every_format() {
+    let text = std::fs::read_to_string(top().join("docs/formats.md")).expect("docs/formats.md");
+    let help =
+        Command::new(cargo_bin!("plotplan")).args(["convert", "-h"]).output().expect("the program runs");
+    let help = String::from_utf8_lossy(&help.stdout).into_owned();
+    let (_, values) = help.split_once("[possible values: ticks").expect("the formats");
+    let values = values.split(']').next().expect("an end");
+    let formats: Vec<&str> = values.split([',', ' ', '\n']).filter(|word| !word.is_empty()).collect();
+    assert!(formats.len() > 15, "{formats:?}");
+    for format in formats {
+        assert!(text.contains(&format!("`{format}`")), "docs/formats.md says nothing of {format}");
+    }
+}

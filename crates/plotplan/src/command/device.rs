@@ -33,9 +33,6 @@ pub(crate) fn run(arguments: &Device) -> Result<(), Failure> {
         .map_err(Failure::Io)?;
     let mut faulty = Faulty::new(device(arguments, machine.as_ref()), arguments.fault.clone());
     serve(arguments, &mut faulty, &ended).map_err(Failure::Io)?;
-    if let Some(link) = &arguments.link {
-        let _ = std::fs::remove_file(link);
-    }
     let lost = faulty.device().lost_bytes();
     if lost > 0 {
         terminal::warning(&format!("{lost} bytes came when the machine's buffer was full, and were lost"));
@@ -81,6 +78,15 @@ fn open(arguments: &Device) -> anyhow::Result<PseudoTerminal> {
     Ok(pty)
 }
 
+/// Closes it, and takes its link away, unless that is another's by now.
+fn close(arguments: &Device, pty: Option<PseudoTerminal>) {
+    if let (Some(link), Some(pty)) = (&arguments.link, pty)
+        && std::fs::read_link(link).is_ok_and(|path| path == *pty.path())
+    {
+        let _ = std::fs::remove_file(link);
+    }
+}
+
 fn serve(arguments: &Device, faulty: &mut Faulty, ended: &AtomicBool) -> anyhow::Result<()> {
     let begun = now();
     let now_us = || (now().duration_since(begun).as_secs_f64() * arguments.haste * 1e6) as u64;
@@ -96,12 +102,7 @@ fn serve(arguments: &Device, faulty: &mut Faulty, ended: &AtomicBool) -> anyhow:
         let time_us = now_us();
         faulty.advance(time_us);
         match (faulty.plugged(time_us), &pty) {
-            (false, Some(_)) => {
-                pty = None;
-                if let Some(link) = &arguments.link {
-                    let _ = std::fs::remove_file(link);
-                }
-            }
+            (false, Some(_)) => close(arguments, pty.take()),
             (true, None) => pty = Some(open(arguments)?),
             _ => {}
         }
@@ -129,6 +130,7 @@ fn serve(arguments: &Device, faulty: &mut Faulty, ended: &AtomicBool) -> anyhow:
         }
     }
     faulty.advance(now_us());
+    close(arguments, pty);
     Ok(())
 }
 

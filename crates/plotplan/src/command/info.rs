@@ -129,7 +129,7 @@ fn plotter(profile: &Profile) -> String {
     let (p1, p2) = profile.scaling_points;
     let clip = profile.hard_clip;
     format!(
-        "plotter  {reason}; unit {} mm\n         reach {}, {} to {}, {}, scaling points {}, {} and {}, {}\n",
+        "plotter  {reason}; unit {} mm\n         reach {:.0}, {:.0} to {:.0}, {:.0}, scaling points {:.0}, {:.0} and {:.0}, {:.0}\n",
         profile.unit_mm, clip.x0, clip.y0, clip.x1, clip.y1, p1.x, p1.y, p2.x, p2.y
     )
 }
