@@ -24,7 +24,7 @@ pub(crate) fn merge(strokes: Vec<Stroke>, keep_direction: bool) -> Vec<Stroke> {
     let mut strokes: Vec<Option<Stroke>> = strokes.into_iter().map(Some).collect();
     let mut merged = Vec::new();
     for first in 0..strokes.len() {
-        let Some(source) = strokes[first].as_ref().map(|stroke| stroke.source()) else { continue };
+        let Some(source) = strokes[first].as_ref().map(Stroke::source) else { continue };
         // Back to where the trail begins, or around to where we are.
         let mut entry = 2 * first;
         while let Some(before) = partner[entry] {
