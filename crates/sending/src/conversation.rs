@@ -105,3 +105,27 @@ pub(crate) fn unframed(line: &str) -> Option<&str> {
     let (text, sum) = line.rsplit_once('*')?;
     (sum.parse() == Ok(checksum(text.as_bytes()))).then_some(text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_documentation_shows_a_line_as_it_is_sent() {
+        let documentation = include_str!("../../../docs/sending.md");
+        assert!(documentation.contains(&format!("`{}`", framed("12:m 1 10000 804 -4"))));
+    }
+
+    #[test]
+    fn a_changed_byte_is_noticed() {
+        let line = framed("12:m 1 10000 804 -4");
+        for at in 0..line.len() {
+            for bit in 0..7 {
+                let mut bytes = line.clone().into_bytes();
+                bytes[at] ^= 1 << bit;
+                let changed = String::from_utf8_lossy(&bytes).into_owned();
+                assert_ne!(unframed(&changed), unframed(&line), "{changed}");
+            }
+        }
+    }
+}

@@ -225,6 +225,30 @@ fn many_mishaps_in_one_plan() {
     }
 }
 
+#[test]
+fn the_single_belt_plotters_own_program_cuts_corners_by_a_millimetre() {
+    let table = drawing();
+    // It takes a place for reached from within 1 mm in both directions.
+    let mut machine = Faulty::new(Box::new(XyPlotter::new(true, 1.0)), Vec::new());
+    let mut conversation = Protocol::XySerial.converse(Protocol::XySerial.script(&table));
+    let ended = simulate::run(&mut *conversation, &mut machine, 0, None, 3_600_000_000);
+    assert_eq!(ended.outcome, Some(Outcome::Done));
+    let (drawn, wanted) = (machine.device().ink().lines(), Protocol::XySerial.wanted(&table));
+    assert_eq!(drawn.len(), wanted.len());
+    let farthest = |lines: &[(u16, Vec<[f64; 2]>)], from: &[(u16, Vec<[f64; 2]>)]| {
+        let points = |lines: &[(u16, Vec<[f64; 2]>)]| {
+            lines.iter().flat_map(|(_, line)| line.clone()).collect::<Vec<_>>()
+        };
+        let from = points(from);
+        let nearest = |p: [f64; 2]| {
+            from.iter().map(|q| (p[0] - q[0]).abs().max((p[1] - q[1]).abs())).fold(f64::INFINITY, f64::min)
+        };
+        points(lines).into_iter().map(nearest).fold(0.0, f64::max)
+    };
+    let off = farthest(&wanted, &drawn);
+    assert!(off > 0.1 && off <= 1.0, "{off} mm");
+}
+
 proptest! {
     #[test]
     fn an_ebb_makes_exactly_the_steps_of_any_plan(

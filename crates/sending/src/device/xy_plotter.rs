@@ -138,7 +138,8 @@ impl XyPlotter {
                 let (y, x) = (tenth(number(&line[..comma])), tenth(number(&line[comma + 1..=last])));
                 if x < RANGE && y < RANGE {
                     let here = self.at(now_us);
-                    if here == self.to {
+                    // It turns here; the same place again is no turn.
+                    if here == self.to || self.to != [x, y] {
                         self.ink.go(here);
                     }
                     self.from = here;
