@@ -130,7 +130,7 @@ fn labels(bytes: &mut Vec<u8>, chance: &mut Chance) {
     let turn = if chance.up_to(2.0) < 1.0 { "1,0" } else { "0,1" };
     let (x, y) = (chance.up_to(WIDTH - 3000.0) as i32, chance.up_to(HEIGHT - 3000.0) as i32);
     say(bytes, &format!("SI{size:.2},{:.2};DI{turn};PU{x},{y};LB", 1.5 * size));
-    for _ in 0..1 + chance.up_to(3.0) as usize {
+    for _ in 0..=chance.up_to(3.0) as usize {
         say(bytes, WORDS[chance.up_to(8.0) as usize]);
     }
     say(bytes, "\x03\r\n");
