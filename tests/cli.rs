@@ -577,6 +577,8 @@ fn help_for_people_and_shells() {
         "info",
         "verify",
         "preview",
+        "send",
+        "device",
         "machine list",
         "machine show",
         "machine check",
@@ -593,7 +595,54 @@ fn help_for_people_and_shells() {
     let man = desk.good("man");
     assert!(man.text().contains(".TH plotplan 1") && man.text().contains("convert"), "{}", man.text());
     let version = desk.good("--version");
-    assert_eq!(version.text(), concat!("plotplan ", env!("CARGO_PKG_VERSION"), "\n"));
+    // With the commit, where the program was built in a checkout.
+    let commit = version.text().strip_prefix(concat!("plotplan ", env!("CARGO_PKG_VERSION"))).map(str::trim);
+    let commit = commit.expect("name and version").trim_matches(['(', ')']);
+    assert!(commit.bytes().all(|byte| byte.is_ascii_hexdigit()), "{}", version.text());
+    let page = desk.good("man send");
+    assert!(
+        page.text().contains(".TH plotplan-send 1") && page.text().contains("protocol"),
+        "{}",
+        page.text()
+    );
+    assert_eq!(desk.run("man nosuch").code, 2);
+}
+
+#[test]
+fn machines_of_ones_own_go_by_their_names() {
+    let desk = Desk::new();
+    let folder = desk.path().join("plotplan/machines");
+    fs::create_dir_all(&folder).expect("a folder");
+    let mine = desk.good("machine show corexy").text().replacen("name = \"corexy\"", "name = \"mine\"", 1);
+    fs::write(folder.join("mine.toml"), &mine).expect("a file can be written");
+    let run = |arguments: &str| {
+        let mut command = desk.command(arguments);
+        Said::of(command.env("XDG_CONFIG_HOME", desk.path()).output().expect("the program runs"))
+    };
+    assert!(run("machine list").text().lines().any(|line| line.starts_with("mine ")));
+    assert_eq!(run("machine show mine").text(), mine);
+    let said = run("convert tiny.hpgl --machine mine --output mine.ticks");
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(desk.text("mine.ticks").contains("; machine: mine\n"));
+    // A plan of that machine finds it by its name.
+    assert_eq!(run("verify mine.ticks --drawing tiny.hpgl").code, 0);
+    let said = run("convert tiny.hpgl --machine mime");
+    assert!(said.code == 2 && said.err.contains("did you mean mine?"), "{}", said.err);
+    assert_eq!(desk.run("machine show mine").code, 2);
+}
+
+#[test]
+fn points_are_a_drawing() {
+    let desk = Desk::new();
+    desk.put("points.txt", "// seed 4's\n<70.05, 82.46>, <74.10, 83.20>,\n<74.1, 83.2>, <74.10, 90.00>\n");
+    let svg = desk.good("convert points.txt --format svg");
+    assert!(svg.text().contains("74.1"), "{}", svg.text());
+    desk.good("convert points.txt --machine polar --output points.ticks");
+    desk.good("verify points.ticks --drawing points.txt");
+    let said = desk.good("info points.txt");
+    assert!(said.text().contains("points <x, y>, mm") && said.text().contains("10.9 mm"), "{}", said.text());
+    desk.good("preview points.txt --machine polar --output points.svg");
+    desk.good("check points.txt --machine polar");
 }
 
 /// The six numbers of a CSV plan's placement.
