@@ -71,9 +71,9 @@ pub struct Asking {
 
 impl Asking {
     /// With a receive buffer of so many bytes.
-    pub fn new(script: Script, window: usize) -> Self {
+    pub fn new(mut script: Script, window: usize) -> Self {
         Self {
-            steps: script.steps.clone(),
+            steps: std::mem::take(&mut script.steps),
             script,
             taken: 0,
             said: 0,
@@ -270,7 +270,7 @@ impl Conversation for Asking {
         }
         let mut out = String::new();
         if let Some(failed) = self.failing.clone() {
-            for step in self.script.stopping(0).0.iter().filter(|_| !self.is_ebb()) {
+            for step in self.script.stopping(&[]).0.iter().filter(|_| !self.is_ebb()) {
                 out.push_str(&step.text);
                 out.push_str(self.end());
             }
@@ -337,7 +337,7 @@ impl Conversation for Asking {
             return;
         }
         // Lines that were said and found not to be done are said again: they are part of what was begun.
-        let (tail, row) = self.script.stopping(self.ever);
+        let (tail, row) = self.script.stopping(&self.steps[..self.ever]);
         self.steps.truncate(self.ever);
         self.steps.extend(tail);
         self.stopping = Some(row);

@@ -24,9 +24,9 @@ pub struct Blind {
 
 impl Blind {
     /// All at once, or each line so long before its time.
-    pub fn new(script: Script, lead_us: Option<u64>) -> Self {
+    pub fn new(mut script: Script, lead_us: Option<u64>) -> Self {
         Self {
-            steps: script.steps.clone(),
+            steps: std::mem::take(&mut script.steps),
             script,
             said: 0,
             lead_us,
@@ -81,7 +81,8 @@ impl Conversation for Blind {
         if self.stopping.is_some() || self.outcome.is_some() {
             return;
         }
-        let (tail, row) = if self.said == 0 { (Vec::new(), 0) } else { self.script.stopping(self.said) };
+        let (tail, row) =
+            if self.said == 0 { (Vec::new(), 0) } else { self.script.stopping(&self.steps[..self.said]) };
         self.steps.truncate(self.said);
         self.steps.extend(tail);
         self.stopping = Some(row);

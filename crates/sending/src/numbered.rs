@@ -24,6 +24,8 @@ use crate::script::{Script, Step};
 const PATIENCE_US: u64 = 1_000_000;
 /// A line is said so often without any progress.
 const TRIES: u32 = 12;
+/// A pen that is lifted because of an error has so long, microseconds.
+const LIFT_US: u64 = 300_000;
 /// So many lines may wait in the machine before a new one is answered.
 const QUEUE: usize = 48;
 
@@ -45,15 +47,16 @@ pub struct Numbered {
     again_us: u64,
     tries: u32,
     stopping: Option<u64>,
+    failing: Option<Outcome>,
     outcome: Option<Outcome>,
     resent: u64,
 }
 
 impl Numbered {
     /// With so many lines on the way at once.
-    pub fn new(script: Script, window: usize) -> Self {
+    pub fn new(mut script: Script, window: usize) -> Self {
         Self {
-            steps: script.steps.clone(),
+            steps: std::mem::take(&mut script.steps),
             script,
             taken: 0,
             said: 0,
@@ -64,6 +67,7 @@ impl Numbered {
             again_us: 0,
             tries: 0,
             stopping: None,
+            failing: None,
             outcome: None,
             resent: 0,
         }
@@ -78,16 +82,37 @@ impl Numbered {
         lines.checked_sub(1).map_or(0, |last| self.steps[last].row)
     }
 
-    fn fail(&mut self, why: String) {
+    /// Nobody listens any more.
+    fn give_up(&mut self, why: String) {
         let (row, at_most) = (self.row(self.taken), self.row(self.ever));
-        self.outcome.get_or_insert(Outcome::Failed { row, at_most, why });
+        let failed = self.failing.take().unwrap_or(Outcome::Failed { row, at_most, why });
+        self.outcome.get_or_insert(failed);
+    }
+
+    /// The machine cannot follow; it still listens, and lifts the pen where it is.
+    fn fail(&mut self, why: String) {
+        if self.failing.is_some() {
+            return self.give_up(why);
+        }
+        let row = self.row(self.taken);
+        self.failing = Some(Outcome::Failed { row, at_most: row, why });
+        let moved = self.steps[..self.taken].iter().rev().find(|step| step.place.is_some());
+        let lift = moved.filter(|step| !step.text.starts_with("m 0 ")).and_then(|step| {
+            let [a, b] = step.place?;
+            let text = format!("m 0 {LIFT_US} {a} {b}");
+            Some(Step { text, row, lasts_us: LIFT_US, place: step.place })
+        });
+        self.steps.truncate(self.taken);
+        self.steps.extend(lift);
+        (self.said, self.ever) = (self.taken, self.taken);
     }
 
     fn finish_if_done(&mut self) {
         if self.taken == self.steps.len() && self.outcome.is_none() {
-            self.outcome = Some(match self.stopping {
-                Some(row) => Outcome::Stopped { row },
-                None => Outcome::Done,
+            self.outcome = Some(match (self.failing.take(), self.stopping) {
+                (Some(failed), _) => failed,
+                (None, Some(row)) => Outcome::Stopped { row },
+                (None, None) => Outcome::Done,
             });
         }
     }
@@ -130,7 +155,7 @@ impl Conversation for Numbered {
         if self.said > self.taken && now_us >= self.again_us {
             self.tries += 1;
             if self.tries > TRIES {
-                self.fail(format!("no answer to line {} after {TRIES} tries", self.taken));
+                self.give_up(format!("no answer to line {} after {TRIES} tries", self.taken));
                 return Vec::new();
             }
             self.said = self.taken;
@@ -157,14 +182,14 @@ impl Conversation for Numbered {
     }
 
     fn stop(&mut self, now_us: u64) {
-        if self.stopping.is_some() || self.outcome.is_some() {
+        if self.stopping.is_some() || self.failing.is_some() || self.outcome.is_some() {
             return;
         }
         if self.ever == 0 {
             self.outcome = Some(Outcome::Stopped { row: self.row(0) });
             return;
         }
-        let (tail, row) = self.script.stopping(self.ever);
+        let (tail, row) = self.script.stopping(&self.steps[..self.ever]);
         self.steps.truncate(self.ever);
         self.steps.extend(tail);
         self.stopping = Some(row);

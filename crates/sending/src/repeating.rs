@@ -54,15 +54,14 @@ pub struct Repeating {
 
 impl Repeating {
     /// From the script's first line on.
-    pub fn new(script: Script) -> Self {
-        let mut script = script;
+    pub fn new(mut script: Script) -> Self {
         if let Some(first) = script.steps.first() {
             let middle =
                 Step { text: MIDDLE.to_owned(), row: first.row, lasts_us: TO_MIDDLE_US, place: None };
             script.steps.insert(MIDDLE_LINE, middle);
         }
         Self {
-            steps: script.steps.clone(),
+            steps: std::mem::take(&mut script.steps),
             script,
             done: 0,
             state: State::Ready(0),
@@ -190,7 +189,7 @@ impl Conversation for Repeating {
         }
         // The line that is on the way is waited for: it cannot be called back.
         let said = self.done + usize::from(!matches!(self.state, State::Ready(_)));
-        let (tail, row) = self.script.stopping(said);
+        let (tail, row) = self.script.stopping(&self.steps[..said]);
         self.steps.truncate(said);
         self.steps.extend(tail);
         self.stopping = Some(row);

@@ -355,10 +355,10 @@ impl Script {
         found
     }
 
-    /// What follows instead after the first `sent` lines so that the machine comes to rest with the pen up, and the row
-    /// where it then is, from which [`Self::from_row`] goes on.
-    pub fn stopping(&self, sent: usize) -> (Vec<Step>, u64) {
-        let row = sent.checked_sub(1).map_or(0, |last| self.steps[last].row);
+    /// What follows instead after the lines that were `said`, the first of this script's, so that the machine comes to rest
+    /// with the pen up; and the row where it then is, from which [`Self::from_row`] goes on.
+    pub fn stopping(&self, said: &[Step]) -> (Vec<Step>, u64) {
+        let row = said.last().map_or(0, |last| last.row);
         let Some(table) = &self.table else {
             let lift =
                 self.lift.iter().map(|text| Step { text: text.clone(), row, lasts_us: 500_000, place: None });
@@ -367,9 +367,9 @@ impl Script {
         // The row within this table: what was sent last leads there.
         let moves = match self.dialect {
             Dialect::Ebb(..) => None,
-            _ => Some(self.steps[..sent].iter().filter(|step| step.text.starts_with("m ")).count()),
+            _ => Some(said.iter().filter(|step| step.text.starts_with("m ")).count()),
         };
-        let at = moves.unwrap_or_else(|| self.ebb_row(sent));
+        let at = moves.unwrap_or_else(|| self.ebb_row(said));
         let (cut_table, cut_origin) = cut(table, at);
         let origin: Vec<u64> = cut_origin.iter().map(|index| self.origin[*index as usize]).collect();
         let stop_row = origin.last().copied().unwrap_or(row);
@@ -377,11 +377,11 @@ impl Script {
             return (Vec::new(), row);
         };
         // What was sent is the same up to here, but for the first line of tick lines and `EM`.
-        let skipped = self.steps.first().map_or(0, |first| {
+        let skipped = said.first().map_or(0, |first| {
             let begins = |steps: &[Step]| steps.first().is_some_and(|step| step.text.starts_with("EM"));
             usize::from(begins(&script.steps) && !first.text.starts_with("EM"))
         });
-        let mut tail: Vec<Step> = script.steps.get(sent + skipped..).unwrap_or_default().to_vec();
+        let mut tail: Vec<Step> = script.steps.get(said.len() + skipped..).unwrap_or_default().to_vec();
         if let (Dialect::Ebb(..), Some(lift)) = (self.dialect, self.lift.first())
             && tail.is_empty()
         {
@@ -390,14 +390,14 @@ impl Script {
         (tail, stop_row)
     }
 
-    /// The row of the table to which the first `sent` commands lead.
-    fn ebb_row(&self, sent: usize) -> usize {
+    /// The row of the table to which the commands that were `said` lead.
+    fn ebb_row(&self, said: &[Step]) -> usize {
         let (Some(table), Dialect::Ebb(moves, pen)) = (&self.table, self.dialect) else { return 0 };
         let Ok(mut commands) = ebb::commands(table.rows.iter().copied(), moves, pen) else { return 0 };
-        if self.steps.first().is_some_and(|step| !step.text.starts_with("EM")) {
+        if said.first().is_some_and(|step| !step.text.starts_with("EM")) {
             commands.retain(|command| !command.text.starts_with("EM"));
         }
-        sent.checked_sub(1).map_or(0, |last| commands[last].row as usize)
+        said.len().checked_sub(1).map_or(0, |last| commands[last].row as usize)
     }
 
     /// How long all of it takes, microseconds.

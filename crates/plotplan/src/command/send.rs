@@ -32,6 +32,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(100);
 pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let input = input::read(&arguments.plan)?;
     let script = script(arguments, &input)?;
+    warn_of_pens(arguments.protocol, &input);
     if arguments.dry_run {
         let script = started(arguments, &script)?;
         return dry_run(arguments, &script);
@@ -75,6 +76,25 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
 
 fn can_be_asked(protocol: Protocol) -> bool {
     matches!(protocol, Protocol::Ticks | Protocol::Ebb | Protocol::Gcode)
+}
+
+/// Says so where the machine will not hear of the plan's pens.
+fn warn_of_pens(protocol: Protocol, input: &Input) {
+    let what = match protocol {
+        Protocol::Ticks | Protocol::Paced | Protocol::Raw => return,
+        Protocol::XySerial | Protocol::Ebb => {
+            "this protocol knows no pens, all strokes are drawn with the same one"
+        }
+        Protocol::Gcode => {
+            "the machine pauses (M0) where the pen is to be changed, and waits for its cycle start"
+        }
+    };
+    let Ok(plan) = formats::read_plan(&input.bytes) else { return };
+    let pens: std::collections::BTreeSet<u16> = plan.table.rows.iter().map(|row| row.pen).collect();
+    let pens: Vec<String> = pens.into_iter().filter(|pen| *pen != 0).map(|pen| pen.to_string()).collect();
+    if pens.len() > 1 {
+        terminal::warning(&format!("the plan has pens {}: {what}", pens.join(", ")));
+    }
 }
 
 /// The script from where it is to begin.
@@ -273,8 +293,12 @@ impl Wire {
     fn talk(&mut self, conversation: &mut dyn Conversation, reconnect_s: f64) -> Outcome {
         let progress = SendingProgress::new(conversation.progress().of_us);
         let mut interrupts = 0;
+        let mut shown = self.begun;
         let outcome = loop {
-            progress.show(&conversation.progress());
+            if now().duration_since(shown) >= LOOK_AGAIN {
+                shown = now();
+                progress.show(&conversation.progress());
+            }
             if let Some(lost_at) = self.lost_at {
                 if self.look_again() {
                     conversation.reconnected(self.now_us());
