@@ -1,7 +1,7 @@
 //! Lifting the pen's path into joint space, adaptively, with what a time law must know.
 
 use drawing::{Point, Segment};
-use kinematics::{Fault, Joints, Machine, OutOfReach, Unreachable};
+use kinematics::{Fault, Joints, Machine, OutOfReach};
 use nalgebra::Vector2;
 
 use crate::path::{Piece, Section};
@@ -28,7 +28,7 @@ pub enum Course {
 }
 
 /// A stretch of a joint path between two nodes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Cell {
     /// Its length in the parameter `s`.
     pub length: f64,
@@ -129,42 +129,45 @@ impl JointPath {
 }
 
 impl Cell {
+    /// The cell, cut in two so many times over.
+    pub(crate) fn cut(&self, machine: &Machine, course: &Course, times: u32, to: &mut Vec<Self>) {
+        match if times > 0 { self.halves(machine, course) } else { None } {
+            Some(halves) => halves.iter().for_each(|half| half.cut(machine, course, times - 1, to)),
+            None => to.push(*self),
+        }
+    }
+
     /// Two cells in place of this one, with derivatives taken anew; nothing for travel, where there is nothing to gain,
     /// and for cells too short to be cut.
-    pub(crate) fn halves(&self, machine: &Machine, course: &Course) -> Option<[Self; 2]> {
+    fn halves(&self, machine: &Machine, course: &Course) -> Option<[Self; 2]> {
         let Course::Drawn(_, section) = course else { return None };
         if self.length <= 2.0 * SHORTEST {
             return None;
         }
         let piece = &section[self.piece];
-        let at = |share: f64| Rates::at(machine, piece, self.start + share * self.length).ok();
-        let quarters = [at(0.0)?, at(0.25)?, at(0.5)?, at(0.75)?, at(1.0)?];
+        let at = |share: f64| {
+            let t = ((self.start + share * self.length) * piece.rate).min(1.0);
+            // Derivatives are the same at every turn about the base.
+            let pose = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
+            let (first, second) = motor_derivatives(machine, piece, t, &pose);
+            Some((first, second))
+        };
+        let known = |k: usize| (self.first[k], self.second[k]);
+        let places = [known(0), at(0.25)?, known(1), at(0.75)?, known(2)];
         let half = |from: usize| {
-            let samples = [&quarters[from], &quarters[from + 1], &quarters[from + 2]];
-            let start = self.start + 0.25 * from as f64 * self.length;
-            let slack = 0.5 * bulge(machine, samples);
-            // What bounds the joints' bend holds for the whole cell, so for its halves.
+            let places = [places[from], places[from + 1], places[from + 2]];
+            let (first, second) = (places.map(|place| place.0), places.map(|place| place.1));
             Self {
-                bend: self.bend,
-                near_turn: self.near_turn,
-                ..Self::new(self.piece, start, 0.5 * self.length, samples, slack)
+                length: 0.5 * self.length,
+                start: self.start + 0.25 * from as f64 * self.length,
+                slack: 0.5 * bulge(machine, self.pen_speed, &first, &second),
+                first,
+                second,
+                // What holds for all of the cell holds for its halves.
+                ..*self
             }
         };
         Some([half(0), half(2)])
-    }
-
-    fn new(piece: usize, start: f64, length: f64, samples: [&Rates; 3], slack: f64) -> Self {
-        Self {
-            length,
-            piece,
-            start,
-            first: samples.map(|rates| rates.first),
-            second: samples.map(|rates| rates.second),
-            pen_speed: samples.iter().map(|rates| rates.pen_speed).fold(0.0, f64::max),
-            bend: samples.iter().map(|rates| rates.bend).fold(0.0, f64::max),
-            near_turn: false,
-            slack,
-        }
     }
 
     /// Whether the motors move in proportion to the parameter, so that any even acceleration on it is even in the motors.
@@ -244,7 +247,9 @@ impl Lifter<'_> {
         while let Some((a, b)) = pending.pop() {
             let middle = self.sample(piece, 0.5 * (a.s + b.s), a.pose)?;
             let length = b.s - a.s;
-            let bulge = bulge(self.machine, [&a.rates, &middle.rates, &b.rates]);
+            let first = [a.rates.first, middle.rates.first, b.rates.first];
+            let second = [a.rates.second, middle.rates.second, b.rates.second];
+            let bulge = bulge(self.machine, a.rates.pen_speed.max(b.rates.pen_speed), &first, &second);
             if length > SHORTEST && (bulge > LARGEST_BULGE || !self.is_near(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
@@ -256,9 +261,19 @@ impl Lifter<'_> {
                 return Err(OutOfReach { point: b.point, fault: Fault::Singular { dexterity: 0.0, min } });
             }
             let samples = [&a.rates, &middle.rates, &b.rates];
-            // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
-            let cell = Cell::new(index, a.s, length, samples, 0.5 * bulge);
-            self.cells.push(Cell { near_turn: piece.near_turn, ..cell });
+            let most = |of: fn(&Rates) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
+            self.cells.push(Cell {
+                length,
+                piece: index,
+                start: a.s,
+                first,
+                second,
+                pen_speed: most(|rates| rates.pen_speed),
+                bend: most(|rates| rates.bend),
+                near_turn: piece.near_turn,
+                // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
+                slack: 0.5 * bulge,
+            });
         }
         Ok(())
     }
@@ -289,15 +304,18 @@ impl Lifter<'_> {
     }
 }
 
-impl Rates {
-    /// At `s` on a piece.
-    fn at(machine: &Machine, piece: &Piece, s: f64) -> Result<Self, Unreachable> {
-        let t = (s * piece.rate).min(1.0);
-        // Derivatives are the same at every turn about the base.
-        let pose = machine.geometry().inverse(piece.curve.eval(t))?;
-        Ok(Self::of(machine, piece, t, &pose))
-    }
+/// First and second derivatives of the motors by `s`, at a piece's own parameter `t`, where the pose is `pose`.
+fn motor_derivatives(
+    machine: &Machine,
+    piece: &Piece,
+    t: f64,
+    pose: &Joints,
+) -> (Vector2<f64>, Vector2<f64>) {
+    let (velocity, acceleration) = piece.curve.derivatives(t);
+    machine.motor_derivatives(pose, piece.rate * velocity, piece.rate * piece.rate * acceleration)
+}
 
+impl Rates {
     /// At the curve's own parameter `t`, where the pose is `pose`.
     fn of(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Self {
         let (velocity, acceleration) = piece.curve.derivatives(t);
@@ -317,26 +335,26 @@ impl Rates {
 
 /// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
 /// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
-fn bulge(machine: &Machine, [a, middle, b]: [&Rates; 3]) -> f64 {
-    let motors = machine.motors();
-    let off = |x: f64, y: f64, z: f64| (y - 0.5 * (x + z)).abs();
+fn bulge(
+    machine: &Machine,
+    pen_speed: f64,
+    first: &[Vector2<f64>; 3],
+    second: &[Vector2<f64>; 3],
+) -> f64 {
+    let off = |x: [f64; 3]| (x[1] - 0.5 * (x[0] + x[2])).abs();
+    let most = |x: [f64; 3]| x[0].abs().max(x[1].abs()).max(x[2].abs());
     let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);
     let (mut turning, mut turning_off) = (0.0_f64, 0.0_f64);
-    for (k, motor) in motors.iter().enumerate() {
-        let of = |rates: &Rates| {
-            (rates.first[k] / motor.max_speed, rates.second[k] / motor.max_acceleration)
-        };
-        let (x, y, z) = (of(a), of(middle), of(b));
-        slowness = slowness.max(x.0.abs()).max(y.0.abs()).max(z.0.abs());
-        slowness_off = slowness_off.max(off(x.0, y.0, z.0));
-        turning = turning.max(x.1.abs()).max(y.1.abs()).max(z.1.abs());
-        turning_off = turning_off.max(off(x.1, y.1, z.1));
+    for (k, motor) in machine.motors().iter().enumerate() {
+        let rates = first.map(|first| first[k] / motor.max_speed);
+        let turns = second.map(|second| second[k] / motor.max_acceleration);
+        (slowness, slowness_off) = (slowness.max(most(rates)), slowness_off.max(off(rates)));
+        (turning, turning_off) = (turning.max(most(turns)), turning_off.max(off(turns)));
     }
     if slowness == 0.0 {
         return 0.0;
     }
-    let fastest = (machine.pen().max_speed / a.pen_speed.max(b.pen_speed)).min(1.0 / slowness);
+    let fastest = (machine.pen().max_speed / pen_speed).min(1.0 / slowness);
     let square_speed = (fastest * fastest).min(1.0 / turning);
     slowness_off / slowness + turning_off * square_speed
 }
-

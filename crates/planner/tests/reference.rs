@@ -30,7 +30,7 @@ mod machines;
 const BUDGET: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.05, row: f64::INFINITY };
 
 /// By how much a profile may take longer than the best, as a share.
-const EXCESS: f64 = 0.09;
+const EXCESS: f64 = 0.002;
 
 /// The path and the motors at one place, from one side.
 #[derive(Clone, Copy)]

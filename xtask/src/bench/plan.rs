@@ -79,7 +79,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
     ] {
         println!("{name:<14} {:>10.2} {:>10.2} {:>10.3}", 1e3 * one, 1e3 * ten, (ten / one).log10());
     }
-    println!("cells: {} of {} joint paths", stages.cells, stages.paths.len());
+    println!("cells: {} of {} joint paths; {} phases", stages.cells, stages.paths.len(), stages.profiles.iter().map(|p| p.phases.len()).sum::<usize>());
     println!("finite differences of {PERIOD_US} us: speed {:.5} of the limit", peaks.speed);
     let tick_room = ACCELERATION * TICKS_PER_MM * (PERIOD_US as f64 * 1e-6).powi(2) + 2.0;
     let goals = [

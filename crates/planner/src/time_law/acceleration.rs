@@ -31,127 +31,151 @@ const IDLE: f64 = 2e-3;
 const ROUNDS: usize = 8;
 
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    let bounds = |cells: &[Cell]| cells.iter().map(|cell| Bounds::new(machine, cell, cap)).collect::<Vec<_>>();
-    let coarse = Law::within(bounds(&path.cells), 0.0, 0.0);
+    let hold = |cell: &Cell| Held { bounds: Bounds::new(machine, cell, cap), cell: *cell };
+    let mut coarse = Law::default();
+    coarse.cells.extend(path.cells.iter().map(hold));
+    coarse.sweep(0.0, 0.0);
+    let mut window = Law::default();
     let mut profile = Profile { phases: Vec::new(), duration: 0.0, limiting: Limiting::default() };
     let (mut from, mut speed) = (0, 0.0);
     while from < path.cells.len() {
-        let to = coarse.cut(&path.cells, from + WINDOW);
-        let end = coarse.nodes[to];
-        let (cells, law) = refined(machine, path, cap, from..to, speed, end);
-        speed = law.nodes[cells.len()];
-        law.emit(&cells, &mut profile);
+        let to = coarse.window_end(from + WINDOW);
+        window.cells.clear();
+        window.cells.extend_from_slice(&coarse.cells[from..to]);
+        window.sweep(speed, coarse.nodes[to]);
+        window.refine(machine, &path.course, cap);
+        speed = window.nodes[window.order.len()];
+        window.emit(&mut profile);
         from = to;
     }
     profile
 }
 
-/// The cells of a window, cut as often as it pays, and their law: from `speed` (as b, at most what the coarse law has
-/// there) to at most `end`.
-fn refined(
-    machine: &Machine,
-    path: &JointPath,
-    cap: &SpeedCap,
-    window: std::ops::Range<usize>,
-    speed: f64,
-    end: f64,
-) -> (Vec<Cell>, Law) {
-    let mut cells = path.cells[window].to_vec();
-    let bounds = |cells: &[Cell]| cells.iter().map(|cell| Bounds::new(machine, cell, cap)).collect::<Vec<_>>();
-    let mut law = Law::within(bounds(&cells), speed, end);
-    for _ in 0..ROUNDS {
-        let Some(finer) = law.cut_idle(machine, &path.course, &cells) else { break };
-        // The finer cells' conditions are held in more places, so in rare cases the speed given is too high for them.
-        let Some(finer_law) = Law::new(bounds(&finer), speed, end) else { break };
-        let before = law.time();
-        (cells, law) = (finer, finer_law);
-        if before.is_finite() && before - law.time() < LEAST_GAIN * before {
-            break;
-        }
-    }
-    (cells, law)
+/// A cell with its conditions.
+#[derive(Clone)]
+struct Held {
+    cell: Cell,
+    bounds: Bounds,
 }
 
 /// The fastest way over some cells.
+#[derive(Default)]
 struct Law {
-    bounds: Vec<Bounds>,
+    cells: Vec<Held>,
+    /// The cells' order along the path, as indices.
+    order: Vec<usize>,
     /// b at every node.
     nodes: Vec<f64>,
 }
 
 impl Law {
-    /// From b = `start` to at most `end`; nothing if there is no way.
-    fn new(bounds: Vec<Bounds>, start: f64, end: f64) -> Option<Self> {
-        let law = Self::within(bounds, start, end);
-        (law.nodes[0] >= start).then_some(law)
+    /// Finds b at every node of all cells in a row: from `start`, or the largest b from which there is a way if that is
+    /// less, to at most `end`.
+    fn sweep(&mut self, start: f64, end: f64) {
+        self.order.clear();
+        self.order.extend(0..self.cells.len());
+        sweeps(&self.cells, &self.order, start, end, &mut self.nodes);
     }
 
-    /// The same from at most `start`.
-    fn within(bounds: Vec<Bounds>, start: f64, end: f64) -> Self {
-        let mut nodes = vec![end; bounds.len() + 1];
-        for k in (0..bounds.len()).rev() {
-            let before = if k > 0 { bounds[k - 1].cap } else { start };
-            nodes[k] = bounds[k].largest(nodes[k + 1]).min(bounds[k].cap).min(before);
-        }
-        for k in 0..bounds.len() {
-            nodes[k + 1] = bounds[k].fastest(nodes[k], nodes[k + 1]);
-        }
-        Self { bounds, nodes }
+    /// Every cell with b at its start and end.
+    fn runs(&self) -> impl Iterator<Item = (&Held, f64, f64)> {
+        let cells = self.order.iter().map(|index| &self.cells[*index]);
+        cells.zip(self.nodes.windows(2)).map(|(held, b)| (held, b[0], b[1]))
     }
 
     fn time(&self) -> f64 {
-        self.bounds.iter().zip(self.nodes.windows(2)).map(|(bounds, b)| bounds.time(b[0], b[1])).sum()
+        self.runs().map(|(held, from, to)| held.bounds.time(from, to)).sum()
     }
 
     /// The node at which a window that is to end at `wanted` should: where the law is nearest to the largest speed, or on
     /// a straight way, so that nothing is lost by keeping to the coarse law there.
-    fn cut(&self, cells: &[Cell], wanted: usize) -> usize {
-        if wanted + WINDOW / 4 >= cells.len() {
-            return cells.len();
+    fn window_end(&self, wanted: usize) -> usize {
+        if wanted + WINDOW / 4 >= self.cells.len() {
+            return self.cells.len();
         }
-        let room = |k: &usize| {
-            let straight = cells[k - 1].is_straight() && cells[*k].is_straight();
-            let cap = self.bounds[k - 1].cap.min(self.bounds[*k].cap);
-            if straight { 2.0 } else { self.nodes[*k] / cap }
+        let room = |k: usize| {
+            let (before, after) = (&self.cells[k - 1], &self.cells[k]);
+            let straight = before.cell.is_straight() && after.cell.is_straight();
+            if straight { 2.0 } else { self.nodes[k] / before.bounds.cap.min(after.bounds.cap) }
         };
         let best = (wanted..wanted + WINDOW / 4).fold((wanted, 0.0), |best, k| {
-            let room = room(&k);
+            let room = room(k);
             if room > best.1 { (k, room) } else { best }
         });
         best.0
     }
 
-    /// The cells with those cut in two whose motors idle, unless idling costs next to nothing.
-    fn cut_idle(&self, machine: &Machine, course: &Course, cells: &[Cell]) -> Option<Vec<Cell>> {
-        let mut idle = Vec::with_capacity(cells.len());
-        let (mut total, mut cost, mut hanging) = (0.0, 0.0, false);
-        for (bounds, b) in self.bounds.iter().zip(self.nodes.windows(2)) {
-            let (time, idleness) = (bounds.time(b[0], b[1]), bounds.idleness(b[0], b[1]));
-            total += time;
-            // A motion with limits lower by a share takes longer by half of it.
-            cost += 0.5 * idleness * time;
-            let hangs = bounds.hangs_on_speed(b[0], b[1]);
-            hanging |= hangs;
-            idle.push(if hangs { 1.0 } else { idleness });
-        }
-        if total.is_finite() && !hanging && cost <= IDLE_COST * total {
-            return None;
-        }
-        let mut finer = Vec::with_capacity(2 * cells.len());
-        for (cell, idleness) in cells.iter().zip(idle) {
-            match if idleness > IDLE { cell.halves(machine, course) } else { None } {
-                Some(halves) => finer.extend(halves),
-                None => finer.push(cell.clone()),
+    /// Cuts the cells as often as it pays.
+    fn refine(&mut self, machine: &Machine, course: &Course, cap: &SpeedCap) {
+        let (start, end) = (self.nodes[0], self.nodes[self.order.len()]);
+        let mut time = self.time();
+        let (mut order, mut nodes, mut finer) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            let Some(cuts) = self.cuts(time) else { break };
+            order.clear();
+            for (index, cuts) in self.order.iter().zip(cuts) {
+                finer.clear();
+                self.cells[*index].cell.cut(machine, course, cuts, &mut finer);
+                if finer.len() > 1 {
+                    order.extend(self.cells.len()..self.cells.len() + finer.len());
+                    let hold = |cell: &Cell| Held { bounds: Bounds::new(machine, cell, cap), cell: *cell };
+                    self.cells.extend(finer.iter().map(hold));
+                } else {
+                    order.push(*index);
+                }
+            }
+            sweeps(&self.cells, &order, start, end, &mut nodes);
+            // The finer cells' conditions are held in more places, so in rare cases the speed given is too high for them.
+            if order.len() == self.order.len() || nodes[0] < start {
+                break;
+            }
+            std::mem::swap(&mut self.order, &mut order);
+            std::mem::swap(&mut self.nodes, &mut nodes);
+            let before = std::mem::replace(&mut time, self.time());
+            if before.is_finite() && before - time < LEAST_GAIN * before {
+                break;
             }
         }
-        (finer.len() > cells.len()).then_some(finer)
     }
 
-    fn emit(&self, cells: &[Cell], profile: &mut Profile) {
+    /// How often each cell is to be cut in two because its motors idle; nothing if that costs next to no `time`.
+    fn cuts(&self, time: f64) -> Option<Vec<u32>> {
+        let mut cuts = Vec::with_capacity(self.order.len());
+        let (mut cost, mut hanging) = (0.0, false);
+        for (Held { bounds, cell }, from, to) in self.runs() {
+            // What the limits were lowered by for want of samples counts as idle too.
+            let idleness = bounds.idleness(from, to) + cell.slack;
+            // A motion with limits lower by a share takes longer by half of it.
+            cost += 0.5 * idleness * bounds.time(from, to);
+            let hangs = bounds.hangs_on_speed(from, to);
+            hanging |= hangs;
+            // Half the length, half the idleness.
+            let thresholds = [IDLE, 3.0 * IDLE, 6.0 * IDLE];
+            let idle = thresholds.iter().filter(|threshold| idleness > **threshold).count() as u32;
+            cuts.push(idle.max(u32::from(hangs)));
+        }
+        (!time.is_finite() || hanging || cost > IDLE_COST * time).then_some(cuts)
+    }
+
+    fn emit(&self, profile: &mut Profile) {
         let first = profile.phases.len();
-        for ((cell, bounds), b) in cells.iter().zip(&self.bounds).zip(self.nodes.windows(2)) {
-            bounds.phases(cell, b[0], b[1], &mut profile.phases, &mut profile.limiting);
+        for (held, from, to) in self.runs() {
+            held.bounds.phases(&held.cell, from, to, &mut profile.phases, &mut profile.limiting);
         }
         profile.duration += profile.phases[first..].iter().map(|phase| phase.duration).sum::<f64>();
+    }
+}
+
+/// b at every node: backward from where the end can still be reached, forward as fast as that allows.
+fn sweeps(cells: &[Held], order: &[usize], start: f64, end: f64, nodes: &mut Vec<f64>) {
+    nodes.clear();
+    nodes.resize(order.len() + 1, end);
+    for (k, index) in order.iter().enumerate().rev() {
+        let bounds = &cells[*index].bounds;
+        let before = if k > 0 { cells[order[k - 1]].bounds.cap } else { start };
+        nodes[k] = bounds.largest(nodes[k + 1]).min(before);
+    }
+    for (k, index) in order.iter().enumerate() {
+        nodes[k + 1] = cells[*index].bounds.fastest(nodes[k], nodes[k + 1]);
     }
 }

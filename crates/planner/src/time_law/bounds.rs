@@ -35,13 +35,10 @@ pub(super) struct Bounds {
     twice: f64,
     /// The largest b anywhere on it by speed.
     pub(super) cap: f64,
-    /// Whose speed that is.
+    /// The largest b at its start for which some u fulfils the conditions, wherever that leads.
+    top: f64,
+    /// Whose speed `cap` is.
     capped_by: Cap,
-    /// For peaks inside the cell: bounds on |m'| / a and |m''| / a of each motor, and of the pen near a turn.
-    first: [f64; 3],
-    second: [f64; 3],
-    /// By how much the motors' limits were lowered, see [`Cell::slack`].
-    slack: f64,
 }
 
 /// What caps the speed.
@@ -64,7 +61,6 @@ enum Run {
 impl Bounds {
     pub(super) fn new(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> Self {
         let mut strips = [Strip::default(); 8];
-        let (mut first, mut second) = ([0.0_f64; 3], [0.0_f64; 3]);
         let pen = cap.pen / cell.pen_speed;
         let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
         let (mut largest, mut capped_by) = (pen * pen, Cap::Pen);
@@ -81,8 +77,6 @@ impl Bounds {
                 let (m1, m2) = (cell.first[j][k] / limit, cell.second[j][k] / limit);
                 let p = m1 + 2.0 * share * cell.length * m2;
                 strips[3 * k + j] = if p < 0.0 { Strip { p: -p, r: -m2 } } else { Strip { p, r: m2 } };
-                first[k] = first[k].max(m1.abs());
-                second[k] = second[k].max(m2.abs());
                 fastest = fastest.max(cell.first[j][k].abs());
             }
             let speed = motor.max_speed / (fastest * (1.0 + cell.slack));
@@ -93,35 +87,20 @@ impl Bounds {
             let (p, r) = (cell.pen_speed / rows, cell.bend / rows);
             strips[6] = Strip { p, r };
             strips[7] = Strip { p, r: -r };
-            (first[2], second[2]) = (p, r);
         }
-        Self { strips, twice: 2.0 * cell.length, cap: largest, capped_by, first, second, slack: cell.slack }
+        let twice = 2.0 * cell.length;
+        let top = highest(if cell.near_turn { &strips } else { &strips[..6] }, twice).min(largest);
+        Self { strips, twice, cap: largest, top, capped_by }
     }
 
     /// The largest b at the start for which some u fulfils all conditions and leads into [0, next].
     pub(super) fn largest(&self, next: f64) -> f64 {
-        // Of every pair of a lower and an upper bound of u: lower(b) <= upper(b).
-        let mut largest = f64::INFINITY;
-        let mut allow = |slope: f64, room: f64| {
-            if slope > 0.0 {
-                largest = largest.min(room / slope);
-            }
+        // (-1 - r b) / p <= (next - b) / twice: the end is not too fast.
+        let most = |strip: &Strip| {
+            let slope = strip.p - self.twice * strip.r;
+            if slope > 0.0 { (strip.p * next + self.twice) / slope } else { f64::INFINITY }
         };
-        for (i, one) in self.strips.iter().enumerate() {
-            for other in &self.strips[i + 1..] {
-                // (-1 - r_i b) / p_i <= (1 - r_j b) / p_j, and with i and j exchanged.
-                allow((one.p * other.r - other.p * one.r).abs(), one.p + other.p);
-            }
-            // A motor that stands still here, whatever u.
-            if one.p == 0.0 {
-                allow(one.r.abs(), 1.0);
-            }
-            // (-1 - r b) / p <= (next - b) / twice: the end is not too fast.
-            allow(one.p - self.twice * one.r, one.p * next + self.twice);
-            // -b / twice <= (1 - r b) / p: the end is not below rest.
-            allow(self.twice * one.r - one.p, self.twice);
-        }
-        largest
+        self.strips.iter().map(most).fold(self.top, f64::min)
     }
 
     /// The largest b at the end, at most `top`, that can be reached from b at the start.
@@ -142,7 +121,7 @@ impl Bounds {
             let b = b0 + share * (b1 - b0);
             1.0 - self.use_of(b0, b1, &[at, 3 + at, 6, 7]).1.max(b / self.cap)
         };
-        (of(0.0, 0) + of(0.5, 1) + of(1.0, 2)) / 3.0 + self.slack
+        (of(0.0, 0) + of(0.5, 1) + of(1.0, 2)) / 3.0
     }
 
     /// Whether a motor that is used hangs on the speed rather than on the acceleration: near a place where its m' vanishes
@@ -167,7 +146,7 @@ impl Bounds {
     }
 
     fn is_straight(&self) -> bool {
-        self.second == [0.0; 3]
+        self.strips.iter().all(|strip| strip.r == 0.0)
     }
 
     /// The time over the cell from b0 to b1, s; infinite from rest to rest where it cannot have a peak.
@@ -211,12 +190,14 @@ impl Bounds {
         if !self.is_straight() && b0 + b1 > 0.0 {
             return Run::Even;
         }
-        // Up to `b` and down again with |u| <= (1 - second * b) / first: (2 b - b0 - b1) first <= twice (1 - second b).
+        // Up to `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f twice |r|:
+        // u = (1 - |r| b) / (p + twice |r|), and (2 b - b0 - b1) / 2 = u length.
         let mut b = self.cap;
-        for (first, second) in self.first.iter().zip(self.second) {
-            b = b.min((self.twice + first * (b0 + b1)) / (2.0 * first + self.twice * second));
+        for Strip { p, r } in self.strips {
+            let (m1, m2) = (p + self.twice * r.abs(), r.abs());
+            b = b.min((self.twice + m1 * (b0 + b1)) / (2.0 * m1 + self.twice * m2));
         }
-        let strongest = self.first.iter().zip(self.second).map(|(first, second)| (1.0 - second * b) / first);
+        let strongest = self.strips.iter().map(|Strip { p, r }| (1.0 - r.abs() * b) / (p + self.twice * r.abs()));
         let u = strongest.fold(f64::INFINITY, f64::min);
         let length = 0.5 * self.twice;
         let (up, down) = ((b - b0) / (2.0 * u), (b - b1) / (2.0 * u));
@@ -250,4 +231,23 @@ impl Bounds {
             of[k] += duration;
         }
     }
+}
+
+/// The largest b for which the strips have a common u that leads to no b below 0.
+fn highest(strips: &[Strip], twice: f64) -> f64 {
+    // Of every pair of a lower and an upper bound of u: lower(b) <= upper(b).
+    let mut least = 0.0_f64;
+    for (i, one) in strips.iter().enumerate() {
+        for other in &strips[i + 1..] {
+            // (-1 - r_i b) / p_i <= (1 - r_j b) / p_j, and with i and j exchanged; 0 / 0 where both motors stand still.
+            least = least.max((one.p * other.r - other.p * one.r).abs() / (one.p + other.p));
+        }
+        // A motor that stands still here, whatever u.
+        if one.p == 0.0 {
+            least = least.max(one.r.abs());
+        }
+        // -b / twice <= (1 - r b) / p: the end is not below rest.
+        least = least.max(one.r - one.p / twice);
+    }
+    1.0 / least
 }
