@@ -209,8 +209,8 @@ fn phase() -> Result<String, Failure> {
     }
     let mut strokes = vec![polyline(&points)];
     strokes.push(polyline(&[(60.0, 140.0), (120.0, 140.0), (120.0, 160.0), (60.0, 150.0)].map(Point::from)));
-    let settings = Settings { tolerance: 0.1, period_us: 4000, park: None, pen_speeds: Vec::new() };
-    let trajectory = plan(&machine, &Drawing { strokes }, &settings)?;
+    let settings = Settings::new(0.1, 4000);
+    let trajectory = plan(&machine, Drawing { strokes }, &settings)?;
     let period = settings.period_us as f64 * 1e-6;
     let rows: Vec<[f64; 2]> = trajectory.rows().filter(|row| row.row.pen > 0).map(|row| row.exact).collect();
     let mut picture = Picture::new(Rect::new(60.0, 40.0, 620.0, 310.0), Rect::new(-1.2, -1.2, 1.2, 1.2));

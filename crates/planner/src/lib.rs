@@ -8,7 +8,8 @@
 //! 2. [`lift`]: a section is lifted into joint space as a [`JointPath`]: **cells** with the motors' first and second
 //!    derivatives along it at start, middle and end, and how much rows bend against it.
 //! 3. [`time_law`]: along a joint path, the fastest speed profile that the motors and the rows allow, from rest to rest.
-//! 4. [`trajectory`]: sections, travel in joint space, pen lifts and drops one after the other, sampled at a fixed
+//! 4. `stroke`: the three for one stroke, from one of the poses in which the machine can begin it.
+//! 5. [`trajectory`]: strokes, travel in joint space, pen lifts and drops one after the other, sampled at a fixed
 //!    period into rows whose ticks are rounded from exact positions, so that nothing drifts.
 //!
 //! Drawings come in machine mm (see [`placement`]). Nothing here knows HPGL, formats or files.
@@ -17,11 +18,15 @@ mod error;
 pub mod lift;
 pub mod path;
 pub mod placement;
+pub mod settings;
+mod stroke;
 pub mod time_law;
 pub mod trajectory;
 mod travel;
 
 pub use error::PlanError;
 pub use lift::JointPath;
-pub use trajectory::{ExactRow, Settings, Times, Trajectory, check_reach, plan};
+pub use settings::{Law, Settings};
+pub use time_law::{Ease, Limiting};
+pub use trajectory::{ExactRow, Times, Trajectory, check_reach, plan};
 pub use travel::{travel_pose, travel_time};

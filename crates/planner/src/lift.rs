@@ -335,12 +335,7 @@ impl Rates {
 
 /// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
 /// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
-fn bulge(
-    machine: &Machine,
-    pen_speed: f64,
-    first: &[Vector2<f64>; 3],
-    second: &[Vector2<f64>; 3],
-) -> f64 {
+fn bulge(machine: &Machine, pen_speed: f64, first: &[Vector2<f64>; 3], second: &[Vector2<f64>; 3]) -> f64 {
     let off = |x: [f64; 3]| (x[1] - 0.5 * (x[0] + x[2])).abs();
     let most = |x: [f64; 3]| x[0].abs().max(x[1].abs()).max(x[2].abs());
     let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);

@@ -1,57 +1,68 @@
 //! A whole plan: drawn sections, travel, pen lifts and drops one after the other, sampled into rows of ticks.
+//!
+//! Strokes are planned a few thousand pieces at a time, on as many threads as there are, and forgotten when their rows are
+//! given: memory follows the longest stroke. A stroke depends on those before it only by the turn in which the machine
+//! arrives, so the rows are the same at any number of threads.
 
-use drawing::{Drawing, Pen, Point, Stroke};
-use kinematics::{Joints, Machine, OutOfReach, Unreachable};
-use nalgebra::Vector2;
+use std::borrow::Cow;
+use std::collections::VecDeque;
+
+use drawing::{Drawing, Stroke};
+use kinematics::{Joints, Machine, OutOfReach};
 use plan::Row;
+use rayon::prelude::*;
 
 use crate::{
-    PlanError,
-    lift::{Course, JointPath},
-    path::{Budget, sections},
-    time_law::{Profile, SpeedCap, profile},
+    PlanError, Settings,
+    lift::Course,
+    settings::{self, Shares},
+    stroke::{Drawn, Move, StrokePlanner, whole_periods},
+    time_law::Limiting,
 };
 
-/// How a plan is made.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// Largest distance between the drawing's ink and the pen's continuous path, both ways, mm.
-    pub tolerance: f64,
-    /// Time between rows, microseconds.
-    pub period_us: u64,
-    /// Where the plan ends, pen up and at rest; the machine's start pose if nothing is said.
-    pub park: Option<Joints>,
-    /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
-    pub pen_speeds: Vec<(Pen, f64)>,
-}
+/// How much geometry is planned at once, in curves of the drawing.
+const BATCH: usize = 4096;
 
-/// The largest share of the tolerance that linear motion between rows may use.
-const ROW_SHARE: f64 = 0.4;
+/// A plan whose motion has no more phases than this is kept, so that its rows can be had again without planning anew.
+const KEPT_PHASES: usize = 1 << 18;
 
-/// The share of the tolerance within which straight pieces may stand for several, where there are corners to blend.
-const SIMPLIFY_SHARE: f64 = 0.3;
-
-/// The share that is kept for what the bounds leave out.
-const RESERVE: f64 = 0.02;
-
-/// One step of a plan. Every leg takes a whole number of periods, so that stops and pen events fall on rows: between rows
-/// motors move linearly, and a stop between two rows would be cut.
+/// One step of a plan.
 #[derive(Clone, Debug)]
 enum Leg {
     /// Motion along a joint path, from rest to rest.
-    Move { course: Course, profile: Profile, end: Joints, periods: u64 },
+    Move(Move),
     /// The pen changes to this state (0 is up) and the motors stand still for so many periods.
     Pen { pen: u16, periods: u64 },
 }
 
-/// A plan in continuous terms: what to do, and when. Memory follows the drawing's geometry, not the plot's time.
+impl Leg {
+    fn periods(&self) -> u64 {
+        match self {
+            Self::Move(Move { periods, .. }) | Self::Pen { periods, .. } => *periods,
+        }
+    }
+
+    fn rows(&self) -> u64 {
+        match self {
+            Self::Move(Move { periods, .. }) => *periods,
+            Self::Pen { periods, .. } => u64::from(*periods > 0),
+        }
+    }
+}
+
+/// A plan: what to do, and when.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'a> {
     machine: &'a Machine,
-    period_us: u64,
-    start: Joints,
-    legs: Vec<Leg>,
+    drawing: Drawing,
+    settings: Settings,
+    shares: Shares,
+    /// All of it, where it is small.
+    kept: Option<Vec<Leg>>,
+    periods: u64,
+    rows: u64,
     times: Times,
+    limiting: Limiting,
 }
 
 /// How the time of a plan is spent, s.
@@ -80,55 +91,50 @@ pub struct ExactRow {
 /// When there is no ink, a setting makes no sense, or a stroke leaves what the machine can draw.
 pub fn plan<'a>(
     machine: &'a Machine,
-    drawing: &Drawing,
+    drawing: Drawing,
     settings: &Settings,
 ) -> Result<Trajectory<'a>, PlanError> {
-    check(settings)?;
+    settings::check(settings)?;
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
     }
-    let budget = Shares::of(machine, settings);
-    let (legs, times) = (Vec::new(), Times::default());
-    Planner { machine, settings, budget, legs, here: machine.start(), times }.run(drawing)
-}
-
-/// How the tolerance is shared out, mm.
-struct Shares {
-    /// To linear motion between rows.
-    row: f64,
-    /// To the path itself.
-    path: Budget,
-}
-
-impl Shares {
-    /// Rows need no more than the largest acceleration can bend the pen's way over a period: by `T² A / 8`. What is
-    /// left goes to the corners.
-    fn of(machine: &Machine, settings: &Settings) -> Self {
-        let period = settings.period_us as f64 * 1e-6;
-        let sheet = machine.sheet();
-        let places = [
-            sheet.center(),
-            Point::new(sheet.x0, sheet.y0),
-            Point::new(sheet.x1, sheet.y0),
-            Point::new(sheet.x1, sheet.y1),
-            Point::new(sheet.x0, sheet.y1),
-        ];
-        let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration);
-        let pen_acceleration = |pose: &Joints| {
-            let jacobian = machine.geometry().jacobian(pose);
-            let of = |rates: Vector2<f64>| (jacobian * machine.joint_rates(&rates)).norm();
-            of(Vector2::new(a, b)).max(of(Vector2::new(a, -b)))
-        };
-        let poses = places.iter().filter_map(|place| machine.pose_near(*place, &machine.start()).ok());
-        let acceleration = poses.map(|pose| pen_acceleration(&pose)).fold(0.0, f64::max);
-        let tolerance = (1.0 - RESERVE) * settings.tolerance;
-        let (needed, share) = (1.5 * period * period * acceleration / 8.0, ROW_SHARE * tolerance);
-        let row = needed.min(share);
-        let path = tolerance - row;
-        let simplify = SIMPLIFY_SHARE * path;
-        let marked = if needed > share { row } else { f64::INFINITY };
-        Self { row, path: Budget { chord: 0.5 * path, simplify, blend: path - simplify, row: marked } }
+    let shares = Shares::of(machine, settings);
+    let trajectory = Trajectory {
+        machine,
+        drawing,
+        settings: settings.clone(),
+        shares,
+        kept: None,
+        periods: 0,
+        rows: 1,
+        times: Times::default(),
+        limiting: Limiting::default(),
+    };
+    let period = settings.period_us as f64 * 1e-6;
+    let (mut periods, mut rows, mut times, mut limiting) = (0, 1, Times::default(), Limiting::default());
+    let (mut kept, mut phases) = (Some(Vec::new()), 0);
+    let mut legs = trajectory.legs();
+    while let Some(leg) = legs.next_leg()? {
+        let time = leg.periods() as f64 * period;
+        match &leg {
+            Leg::Pen { .. } => times.lifting += time,
+            Leg::Move(Move { course: Course::Travel(..), .. }) => times.travel += time,
+            Leg::Move(Move { profile, .. }) => {
+                times.drawing += time;
+                limiting.add(&profile.limiting, time / profile.duration);
+                phases += profile.phases.len();
+            }
+        }
+        periods += leg.periods();
+        rows += leg.rows();
+        if phases > KEPT_PHASES {
+            kept = None;
+        }
+        if let Some(kept) = &mut kept {
+            kept.push(leg);
+        }
     }
+    Ok(Trajectory { kept, periods, rows, times, limiting, ..trajectory })
 }
 
 /// Looks for strokes that the machine cannot draw, in the drawing's order; gives the first.
@@ -150,185 +156,171 @@ pub fn check_reach(machine: &Machine, drawing: &Drawing) -> Result<(), PlanError
     Ok(())
 }
 
-fn check(settings: &Settings) -> Result<(), PlanError> {
-    let setting =
-        |holds: bool, what: &str| holds.then_some(()).ok_or(PlanError::Setting { what: what.into() });
-    setting(
-        settings.tolerance >= 1e-4 && settings.tolerance.is_finite(),
-        "the tolerance must be at least 0.0001 mm",
-    )?;
-    setting((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")?;
-    let speeds = settings.pen_speeds.iter().all(|(_, speed)| *speed > 0.0 && speed.is_finite());
-    setting(speeds, "a pen's speed must be a positive number of mm/s")
-}
-
-struct Planner<'a, 'b> {
-    machine: &'a Machine,
-    settings: &'b Settings,
-    budget: Shares,
-    legs: Vec<Leg>,
-    here: Joints,
-    times: Times,
-}
-
-impl<'a> Planner<'a, '_> {
-    fn run(mut self, drawing: &Drawing) -> Result<Trajectory<'a>, PlanError> {
-        for (index, stroke) in drawing.strokes.iter().enumerate() {
-            self.stroke(stroke).map_err(|source| PlanError::OutOfReach {
-                stroke: index,
-                pen: stroke.pen,
-                span: stroke.source(),
-                source,
-            })?;
-        }
-        self.travel(self.settings.park.unwrap_or(self.machine.start()));
-        let Self { machine, settings, legs, times, .. } = self;
-        Ok(Trajectory { machine, period_us: settings.period_us, start: machine.start(), legs, times })
+impl<'a> Trajectory<'a> {
+    /// The drawing that is drawn, machine mm.
+    pub fn drawing(&self) -> &Drawing {
+        &self.drawing
     }
 
-    /// Travels to the stroke, lowers the pen, draws it and lifts the pen.
-    fn stroke(&mut self, stroke: &Stroke) -> Result<(), OutOfReach> {
-        let start = stroke.start();
-        self.machine.check_point(start)?;
-        let poses =
-            self.machine.poses(start, &self.here).map_err(|fault| OutOfReach { point: start, fault })?;
-        // A stroke around the base may run into a joint limit from one turn and not from another.
-        let mut first_error = None;
-        for pose in poses {
-            match self.lift(stroke, pose) {
-                Ok(paths) => {
-                    self.travel(pose);
-                    self.pen(stroke.pen, self.machine.pen().drop_time, paths.is_empty());
-                    let speed = self.speed_of(stroke.pen);
-                    for (path, end) in paths {
-                        self.times.drawing += self.movement(path, end, speed);
-                        self.here = end;
-                    }
-                    self.pen(Pen(0), self.machine.pen().lift_time, false);
-                    return Ok(());
-                }
-                Err(error) => first_error = first_error.or(Some(error)),
-            }
-        }
-        first_error.map_or(Ok(()), Err)
-    }
-
-    /// How fast a pen may go over the paper, mm/s.
-    fn speed_of(&self, pen: Pen) -> f64 {
-        let own = self.settings.pen_speeds.iter().filter(|(which, _)| *which == pen).map(|(_, speed)| *speed);
-        own.fold(self.machine.pen().max_speed, f64::min)
-    }
-
-    /// The stroke's sections as joint paths, each with the pose at its end.
-    ///
-    /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
-    /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
-    fn lift(&self, stroke: &Stroke, pose: Joints) -> Result<Vec<(JointPath, Joints)>, OutOfReach> {
-        let exact = Budget { simplify: 0.0, blend: 0.0, ..self.budget.path };
-        self.lift_within(stroke, pose, &self.budget.path).or_else(|_| self.lift_within(stroke, pose, &exact))
-    }
-
-    fn lift_within(
-        &self,
-        stroke: &Stroke,
-        pose: Joints,
-        budget: &Budget,
-    ) -> Result<Vec<(JointPath, Joints)>, OutOfReach> {
-        let mut paths = Vec::new();
-        let mut pose = pose;
-        for section in sections(stroke, budget) {
-            let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
-            let path = JointPath::lift(self.machine, section, pose, self.settings.tolerance)?;
-            pose = self.end_pose(&path, end)?;
-            paths.push((path, pose));
-        }
-        Ok(paths)
-    }
-
-    /// The pose at the end of a drawn path, unwrapped along its cells.
-    fn end_pose(&self, path: &JointPath, end: Point) -> Result<Joints, OutOfReach> {
-        let along = path.cells.iter().fold(path.course.start(), |near, cell| {
-            path.course.pose(self.machine, cell.piece, cell.start, &near)
-        });
-        let fault = |unreachable: Unreachable| OutOfReach { point: end, fault: unreachable.into() };
-        self.machine.pose_near(end, &along).map_err(fault)
-    }
-
-    fn travel(&mut self, to: Joints) {
-        if let Some(path) = JointPath::travel(self.machine, self.here, to) {
-            self.times.travel += self.movement(path, to, f64::INFINITY);
-        }
-        self.here = to;
-    }
-
-    /// Lays the time law upon a path and gives the time it takes, s.
-    fn movement(&mut self, path: JointPath, end: Joints, pen: f64) -> f64 {
-        let period = self.settings.period_us as f64 * 1e-6;
-        let cap = SpeedCap { pen, row_deviation: self.budget.row, period };
-        let profile = profile(self.machine, &path, &cap);
-        let periods = whole_periods(profile.duration, period).max(1);
-        self.legs.push(Leg::Move { course: path.course, profile, end, periods });
-        periods as f64 * period
-    }
-
-    fn pen(&mut self, pen: Pen, dwell: f64, dot: bool) {
-        if self.legs.is_empty() {
-            // The first stroke begins where the plan does: the plan still begins with the pen up.
-            self.legs.push(Leg::Pen { pen: 0, periods: 1 });
-        }
-        let period = self.settings.period_us as f64 * 1e-6;
-        // A dot is nothing but its dwell: without any there would be no ink in the plan.
-        let periods = whole_periods(dwell, period).max(u64::from(dot));
-        self.legs.push(Leg::Pen { pen: pen.0, periods });
-        self.times.lifting += periods as f64 * period;
-    }
-}
-
-/// Whole periods that hold `duration`; a hair over a whole number is rounding, not another period.
-fn whole_periods(duration: f64, period: f64) -> u64 {
-    (duration / period - 1e-9).ceil().max(0.0) as u64
-}
-
-impl Trajectory<'_> {
     /// How the time is spent.
     pub fn times(&self) -> Times {
         self.times
     }
 
+    /// For how long of the drawing time each limit was what kept it from being shorter, s.
+    pub fn limiting(&self) -> Limiting {
+        self.limiting
+    }
+
     /// How long the plan takes, microseconds.
     pub fn duration_us(&self) -> u64 {
-        self.legs.iter().map(|leg| leg.periods() * self.period_us).sum()
+        self.periods * self.settings.period_us
     }
 
     /// How many rows [`Self::rows`] gives.
     pub fn row_count(&self) -> u64 {
-        let of = |leg: &Leg| match leg {
-            Leg::Move { periods, .. } => *periods,
-            Leg::Pen { periods, .. } => u64::from(*periods > 0),
-        };
-        self.legs.iter().map(of).sum::<u64>() + 1
+        self.rows
     }
 
     /// The rows, one period apart; while the motors stand still for the pen only the first row is given.
     pub fn rows(&self) -> Rows<'_> {
+        let source = match &self.kept {
+            Some(kept) => Source::Kept(kept.iter()),
+            None => Source::Planned(self.legs()),
+        };
         Rows {
-            trajectory: self,
-            leg: 0,
-            period: 0,
+            machine: self.machine,
+            period_us: self.settings.period_us,
+            source,
+            leg: None,
+            cursor: Cursor::default(),
             t_us: 0,
             pen: 0,
-            pose: self.start,
-            phase: 0,
-            phase_start: 0.0,
+            pose: self.machine.start(),
             finished: false,
+        }
+    }
+
+    fn legs(&self) -> Legs<'_> {
+        let planner = StrokePlanner { machine: self.machine, settings: &self.settings, shares: self.shares };
+        Legs {
+            planner,
+            strokes: &self.drawing.strokes,
+            next: 0,
+            batch: VecDeque::new(),
+            guess: self.machine.start(),
+            here: self.machine.start(),
+            queue: VecDeque::new(),
+            parked: false,
         }
     }
 }
 
-impl Leg {
-    fn periods(&self) -> u64 {
+/// The legs of a plan, in order, planned as they are asked for.
+#[derive(Clone, Debug)]
+struct Legs<'a> {
+    planner: StrokePlanner<'a>,
+    strokes: &'a [Stroke],
+    /// The stroke whose legs come next.
+    next: usize,
+    /// What was planned of the strokes from `next` on.
+    batch: VecDeque<Option<Result<Drawn, OutOfReach>>>,
+    /// Where the machine will be when the batch is drawn, as far as one knows.
+    guess: Joints,
+    /// Where it is after all legs so far.
+    here: Joints,
+    queue: VecDeque<Leg>,
+    parked: bool,
+}
+
+impl Legs<'_> {
+    /// The next leg, or the reason why there is none where one should be.
+    fn next_leg(&mut self) -> Result<Option<Leg>, PlanError> {
+        while self.queue.is_empty() {
+            if self.next < self.strokes.len() {
+                self.stroke()?;
+            } else if self.parked {
+                return Ok(None);
+            } else {
+                self.parked = true;
+                let park = self.planner.settings.park.unwrap_or(self.planner.machine.start());
+                self.travel(park);
+            }
+        }
+        Ok(self.queue.pop_front())
+    }
+
+    /// Travels to the next stroke, lowers the pen, draws it and lifts the pen.
+    fn stroke(&mut self) -> Result<(), PlanError> {
+        if self.batch.is_empty() {
+            self.plan_batch();
+        }
+        let (index, stroke) = (self.next, &self.strokes[self.next]);
+        self.next += 1;
+        let ready = self.batch.pop_front().flatten();
+        let drawn = self.planner.draw(stroke, &self.here, ready).map_err(|source| PlanError::OutOfReach {
+            stroke: index,
+            pen: stroke.pen,
+            span: stroke.source(),
+            source,
+        })?;
+        self.travel(drawn.start);
+        if index == 0 && self.queue.is_empty() {
+            // The first stroke begins where the plan does: the plan still begins with the pen up.
+            self.queue.push_back(Leg::Pen { pen: 0, periods: 1 });
+        }
+        let pen = self.planner.machine.pen();
+        let periods = |dwell: f64| whole_periods(dwell, self.planner.period());
+        // A dot is nothing but its dwell: without any there would be no ink in the plan.
+        let dwell = periods(pen.drop_time).max(u64::from(drawn.moves.is_empty()));
+        let lift = periods(pen.lift_time);
+        self.queue.push_back(Leg::Pen { pen: stroke.pen.0, periods: dwell });
+        self.here = drawn.end();
+        self.queue.extend(drawn.moves.into_iter().map(Leg::Move));
+        self.queue.push_back(Leg::Pen { pen: 0, periods: lift });
+        Ok(())
+    }
+
+    fn travel(&mut self, to: Joints) {
+        self.queue.extend(self.planner.travel(self.here, to).map(Leg::Move));
+        self.here = to;
+    }
+
+    /// Plans the next strokes side by side, each from the pose in which the machine will probably come to it.
+    fn plan_batch(&mut self) {
+        let mut starts = Vec::new();
+        let mut size = 0;
+        for stroke in &self.strokes[self.next..] {
+            let guess = self.planner.guess(stroke, &self.guess);
+            if let Some((_, end)) = guess {
+                self.guess = end;
+            }
+            starts.push((stroke, guess.map(|(start, _)| start)));
+            size += stroke.segment_count() + 1;
+            if size >= BATCH {
+                break;
+            }
+        }
+        let planner = self.planner;
+        let plan =
+            |(stroke, start): (&Stroke, Option<Joints>)| start.map(|start| planner.draw_from(stroke, start));
+        self.batch = starts.into_par_iter().map(plan).collect::<Vec<_>>().into();
+    }
+}
+
+/// Where rows have their legs from.
+#[derive(Clone, Debug)]
+enum Source<'a> {
+    Kept(std::slice::Iter<'a, Leg>),
+    Planned(Legs<'a>),
+}
+
+impl<'a> Source<'a> {
+    fn next_leg(&mut self) -> Option<Cow<'a, Leg>> {
         match self {
-            Self::Move { periods, .. } | Self::Pen { periods, .. } => *periods,
+            Self::Kept(legs) => legs.next().map(Cow::Borrowed),
+            // Whether every stroke can be drawn was seen when the plan was made.
+            Self::Planned(legs) => legs.next_leg().ok().flatten().map(Cow::Owned),
         }
     }
 }
@@ -336,17 +328,16 @@ impl Leg {
 /// Iterator over the rows of a trajectory.
 #[derive(Clone, Debug)]
 pub struct Rows<'a> {
-    trajectory: &'a Trajectory<'a>,
-    leg: usize,
-    /// How many periods of the leg have gone by.
-    period: u64,
+    machine: &'a Machine,
+    period_us: u64,
+    source: Source<'a>,
+    /// The leg at hand.
+    leg: Option<Cow<'a, Leg>>,
+    cursor: Cursor,
     t_us: u64,
     pen: u16,
     /// Where the joints are.
     pose: Joints,
-    /// Phase of the profile that was last looked at, and the profile's own time at its start.
-    phase: usize,
-    phase_start: f64,
     finished: bool,
 }
 
@@ -354,36 +345,35 @@ impl Iterator for Rows<'_> {
     type Item = ExactRow;
 
     fn next(&mut self) -> Option<ExactRow> {
-        let trajectory = self.trajectory;
         loop {
-            match trajectory.legs.get(self.leg) {
-                None if self.finished => return None,
+            if self.leg.is_none() {
+                self.leg = self.source.next_leg();
+                self.cursor = Cursor::default();
+            }
+            match self.leg.as_deref() {
                 None => {
+                    let last = !self.finished;
                     self.finished = true;
-                    return Some(self.emit());
+                    return last.then(|| self.emit());
                 }
                 Some(Leg::Pen { pen, periods }) => {
                     self.pen = *pen;
                     let row = (*periods > 0).then(|| self.emit());
-                    self.t_us += periods * trajectory.period_us;
-                    self.leg += 1;
+                    self.t_us += periods * self.period_us;
+                    self.leg = None;
                     if row.is_some() {
                         return row;
                     }
                 }
-                Some(Leg::Move { course, profile, end, periods }) => {
-                    if self.period == *periods {
-                        self.leg += 1;
-                        (self.period, self.phase, self.phase_start) = (0, 0, 0.0);
-                        self.pose = *end;
-                        continue;
-                    }
-                    // The profile is stretched to a whole number of periods, which only slows it down.
-                    let time = profile.duration * (self.period as f64 / *periods as f64);
-                    self.pose = self.pose_at(course, profile, time);
+                Some(Leg::Move(movement)) if self.cursor.period == movement.periods => {
+                    self.pose = movement.end;
+                    self.leg = None;
+                }
+                Some(Leg::Move(movement)) => {
+                    self.pose = self.cursor.pose(self.machine, movement, &self.pose);
                     let row = self.emit();
-                    self.period += 1;
-                    self.t_us += trajectory.period_us;
+                    self.cursor.period += 1;
+                    self.t_us += self.period_us;
                     return Some(row);
                 }
             }
@@ -391,8 +381,22 @@ impl Iterator for Rows<'_> {
     }
 }
 
-impl Rows<'_> {
-    fn pose_at(&mut self, course: &Course, profile: &Profile, time: f64) -> Joints {
+/// How far a move has gone.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cursor {
+    /// How many of its periods have gone by.
+    period: u64,
+    /// Phase of the profile that was last looked at, and the profile's own time at its start.
+    phase: usize,
+    phase_start: f64,
+}
+
+impl Cursor {
+    /// The pose now; `near` is the one before.
+    fn pose(&mut self, machine: &Machine, movement: &Move, near: &Joints) -> Joints {
+        let Move { course, profile, periods, .. } = movement;
+        // The profile is stretched to a whole number of periods, which only slows it down.
+        let time = profile.duration * (self.period as f64 / *periods as f64);
         while self.phase + 1 < profile.phases.len()
             && time > self.phase_start + profile.phases[self.phase].duration
         {
@@ -400,14 +404,15 @@ impl Rows<'_> {
             self.phase += 1;
         }
         let phase = &profile.phases[self.phase];
-        let since = (time - self.phase_start).max(0.0);
-        let s = phase.start + since * (phase.speed + 0.5 * phase.acceleration * since);
+        let s = phase.way((time - self.phase_start).max(0.0));
         // Between rows no joint turns by half a turn, so the last row's pose says which turn this one is in.
-        course.pose(self.trajectory.machine, phase.piece, s, &self.pose)
+        course.pose(machine, phase.piece, s, near)
     }
+}
 
+impl Rows<'_> {
     fn emit(&self) -> ExactRow {
-        let exact = self.trajectory.machine.ticks(&self.pose);
+        let exact = self.machine.ticks(&self.pose);
         let ticks = [exact.x.round() as i64, exact.y.round() as i64];
         ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks }, exact: [exact.x, exact.y] }
     }

@@ -107,8 +107,8 @@ proptest! {
         period_us in prop_oneof![Just(10_000u64), 500..60_000u64],
     ) {
         let placed = fitted(&machine, &drawing);
-        let settings = Settings { tolerance, period_us, park: None, pen_speeds: Vec::new() };
-        let trajectory = plan(&machine, &placed, &settings).unwrap();
+        let settings = Settings::new(tolerance, period_us);
+        let trajectory = plan(&machine, placed.clone(), &settings).unwrap();
         let rows: Vec<ExactRow> = trajectory.rows().collect();
         let period = period_us as f64 * 1e-6;
 
@@ -166,7 +166,7 @@ proptest! {
 }
 
 fn settings() -> Settings {
-    Settings { tolerance: 0.1, period_us: 10_000, park: None, pen_speeds: Vec::new() }
+    Settings::new(0.1, 10_000)
 }
 
 fn line(points: &[(f64, f64)]) -> Drawing {
@@ -181,7 +181,7 @@ fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
     parts.pen.max_speed = 1e9;
     let machine = Machine::new(parts).unwrap();
     // Along x both motors turn by 92 ticks/mm: v = 4000/92 mm/s, a = 30000/92 mm/s², T = d/v + v/a.
-    let trajectory = plan(&machine, &line(&[(10.0, 10.0), (110.0, 10.0)]), &settings()).unwrap();
+    let trajectory = plan(&machine, line(&[(10.0, 10.0), (110.0, 10.0)]), &settings()).unwrap();
     let (v, a) = (4000.0 / 92.0, 30000.0 / 92.0);
     let exact = 100.0 / v + v / a;
     assert!(trajectory.times().drawing >= exact && trajectory.times().drawing < exact + 0.011);
@@ -190,7 +190,7 @@ fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
 #[test]
 fn the_pen_rests_for_the_whole_of_every_lift_and_drop() {
     let machine = machines::arm();
-    let trajectory = plan(&machine, &line(&[(50.0, 200.0), (60.0, 210.0)]), &settings()).unwrap();
+    let trajectory = plan(&machine, line(&[(50.0, 200.0), (60.0, 210.0)]), &settings()).unwrap();
     let rows: Vec<ExactRow> = trajectory.rows().collect();
     let down = rows.iter().position(|row| row.row.pen == 1).unwrap();
     assert_eq!(rows[down + 1].row.t_us - rows[down].row.t_us, 150_000);
@@ -203,7 +203,7 @@ fn the_pen_rests_for_the_whole_of_every_lift_and_drop() {
 #[test]
 fn a_dot_is_a_pen_that_goes_down_and_up() {
     let machine = machines::corexy();
-    let trajectory = plan(&machine, &line(&[(50.0, 20.0)]), &settings()).unwrap();
+    let trajectory = plan(&machine, line(&[(50.0, 20.0)]), &settings()).unwrap();
     let down: Vec<ExactRow> = trajectory.rows().filter(|row| row.row.pen == 1).collect();
     assert_eq!(down.len(), 1);
     assert_eq!(down[0].row.ticks, [70 * 92, 30 * 92]);
@@ -212,7 +212,7 @@ fn a_dot_is_a_pen_that_goes_down_and_up() {
 #[test]
 fn a_stroke_that_leaves_the_reach_is_named_with_its_place() {
     let machine = machines::polar();
-    let error = plan(&machine, &line(&[(-60.0, 20.0), (60.0, 20.0)]), &settings()).unwrap_err();
+    let error = plan(&machine, line(&[(-60.0, 20.0), (60.0, 20.0)]), &settings()).unwrap_err();
     let PlanError::OutOfReach { stroke, span, source, .. } = error else { panic!("{error}") };
     assert_eq!((stroke, span.start), (0, 7));
     assert_eq!(source.point, Point::new(0.0, 20.0));
@@ -223,7 +223,7 @@ fn a_pen_can_be_slower_than_the_machine() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (110.0, 10.0)]);
     let slow = Settings { pen_speeds: vec![(Pen(1), 5.0), (Pen(2), 1.0)], ..settings() };
-    let seconds = plan(&machine, &drawing, &slow).unwrap().times().drawing;
+    let seconds = plan(&machine, drawing.clone(), &slow).unwrap().times().drawing;
     assert!((20.0..20.2).contains(&seconds), "{seconds}");
 }
 
@@ -235,7 +235,7 @@ fn a_sharp_corner_at_a_long_period_is_not_cut() {
     let drawing = line(&[(0.692, 0.39), (0.175, 0.913), (0.912, 0.372), (0.479, 0.98), (0.0, 0.987)]);
     let placed = fitted(&machine, &drawing);
     let settings = Settings { period_us: 42_493, ..settings() };
-    let trajectory = plan(&machine, &placed, &settings).unwrap();
+    let trajectory = plan(&machine, placed.clone(), &settings).unwrap();
     let rows: Vec<ExactRow> = trajectory.rows().collect();
     let drawn =
         rows.windows(2).filter(|pair| pair[0].row.pen > 0).flat_map(|pair| [pair[0].exact, pair[1].exact]);
@@ -248,7 +248,7 @@ fn a_sharp_corner_at_a_long_period_is_not_cut() {
 #[test]
 fn an_empty_drawing_is_refused() {
     let machine = machines::corexy();
-    assert_eq!(plan(&machine, &Drawing::default(), &settings()).unwrap_err(), PlanError::NoInk);
+    assert_eq!(plan(&machine, Drawing::default(), &settings()).unwrap_err(), PlanError::NoInk);
 }
 
 #[test]

@@ -366,6 +366,6 @@ proptest! {
         let paths = lifted(&machine, &polyline(&points));
         let (ours, below) = (ours(&machine, &paths, 1000.0), below(&machine, &paths, 1000.0, 64));
         prop_assert!(below <= ours * (1.0 + 1e-8), "{} s is less than {} s, which is impossible", ours, below);
-        prop_assert!(ours <= (1.0 + 2.0 * EXCESS) * below, "{} s could perhaps be {} s", ours, below);
+        prop_assert!(ours <= 1.05 * below, "{} s could perhaps be {} s", ours, below);
     }
 }

@@ -148,6 +148,15 @@ pub(crate) struct Planning {
     /// Whose speed the pen draws at
     #[arg(long, value_enum, default_value_t = Speed::Machine)]
     pub(crate) speed: Speed,
+    /// How the pen speeds up and slows down over the paper
+    #[arg(long, value_enum, default_value_t = Law::TimeOptimal)]
+    pub(crate) law: Law,
+    /// With the laws linear, sine and quadratic: time from one vertex to the next
+    #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = time)]
+    pub(crate) segment_time: f64,
+    /// Write the plan even if it breaks the motors' limits, as laws with a given time may; the report says where
+    #[arg(long)]
+    pub(crate) allow_over_limit: bool,
     /// Scale and move the drawing to the largest size that sheet and machine allow
     #[arg(long, conflicts_with_all = ["place", "scale"])]
     pub(crate) fit: bool,
@@ -438,6 +447,21 @@ pub(crate) enum Order {
     Optimize,
     /// As in the file
     File,
+}
+
+/// How the pen speeds up and slows down over the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Law {
+    /// As fast as the motors can, corners rounded within the tolerance
+    TimeOptimal,
+    /// As fast as the motors can from vertex to vertex, with a rest at each
+    Trapezoid,
+    /// Each segment evenly in --segment-time
+    Linear,
+    /// Each segment in --segment-time, fast at first: sin(pi x / 2)
+    Sine,
+    /// Each segment in --segment-time, from rest to rest: 2 x² and back
+    Quadratic,
 }
 
 /// Whose speed the pen draws at.

@@ -19,6 +19,7 @@ use drawing::Pen;
 use hpgl::{Page, PenSettings};
 use kinematics::Machine;
 use planner::placement::{Size, Wish};
+use planner::{Ease, Law};
 use plotplan::pipeline::{Order, Request};
 
 use crate::cli::{self, Arguments, Command, Planning};
@@ -104,6 +105,20 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
         order,
         wish: Wish { rotate: planning.rotate.unwrap_or(0.0).to_radians(), size },
         pen_speeds,
+        law: law(planning),
+        allow_over_limit: planning.allow_over_limit,
+    }
+}
+
+/// The law that the command line's words make.
+fn law(planning: &Planning) -> Law {
+    let eased = |ease: Ease| Law::Eased { ease, segment_time: planning.segment_time };
+    match planning.law {
+        cli::Law::TimeOptimal => Law::TimeOptimal,
+        cli::Law::Trapezoid => Law::Trapezoid,
+        cli::Law::Linear => eased(Ease::Linear),
+        cli::Law::Sine => eased(Ease::SineOut),
+        cli::Law::Quadratic => eased(Ease::QuadraticInOut),
     }
 }
 

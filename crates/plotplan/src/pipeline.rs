@@ -4,7 +4,7 @@ use drawing::{Affine, Drawing, Pen, Point, Rect};
 use kinematics::{Joints, Machine};
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
-use planner::{PlanError, Settings, Trajectory};
+use planner::{Law, PlanError, Settings, Trajectory};
 use verify::Certificate;
 
 /// In which order strokes are drawn.
@@ -40,6 +40,10 @@ pub struct Request {
     pub wish: Wish,
     /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
     pub pen_speeds: Vec<(Pen, f64)>,
+    /// How speed goes along the strokes.
+    pub law: Law,
+    /// Whether the motors' limits may be broken, as some laws do: the certificate says so, and the plan is written.
+    pub allow_over_limit: bool,
 }
 
 /// A step of the work, for whoever shows progress.
@@ -66,8 +70,6 @@ pub struct Compiled<'a> {
     pub placement: Affine,
     /// The drawing where it lies on the machine, in the file's order; machine mm.
     pub placed: Drawing,
-    /// The same in the order in which it is drawn.
-    pub ordered: Drawing,
     /// How far ink reaches beyond the sheet, mm.
     pub beyond_sheet_mm: f64,
     /// What ordering brought, where it was asked for.
@@ -76,6 +78,19 @@ pub struct Compiled<'a> {
     pub strokes: usize,
     /// What the verifier found.
     pub certificate: Certificate,
+}
+
+impl Compiled<'_> {
+    /// The drawing in the order in which it is drawn; machine mm.
+    pub fn ordered(&self) -> &Drawing {
+        self.trajectory.drawing()
+    }
+
+    /// Whether the plan may be written: its certificate holds, or only such limits are broken as may be.
+    pub fn may_be_written(&self, allow_over_limit: bool) -> bool {
+        let only_limits = || self.certificate.failures.iter().all(|failure| failure.violation.is_limit());
+        self.certificate.holds || (allow_over_limit && only_limits())
+    }
 }
 
 /// Travel costs what it takes the motors.
@@ -126,12 +141,12 @@ pub fn compile<'a>(
 
     progress(Step::Planning);
     let settings = Settings {
-        tolerance: request.tolerance_mm,
-        period_us: request.period_us,
-        park: None,
         pen_speeds: request.pen_speeds.clone(),
+        law: request.law,
+        ..Settings::new(request.tolerance_mm, request.period_us)
     };
-    let trajectory = planner::plan(machine, &ordered, &settings)?;
+    let trajectory = planner::plan(machine, ordered, &settings)?;
+    let ordered = trajectory.drawing();
 
     let header = Header {
         machine: machine.name().to_owned(),
@@ -151,7 +166,7 @@ pub fn compile<'a>(
     // Against the drawing in the file's order, so that what ordering lost or changed would show. Where ordering can be
     // seen to have changed nothing but order and direction, against what it gave: where strokes crowd, ink that
     // follows them from end to end is measured much faster.
-    let drawn = if same_ink(&placed, &ordered) { &ordered } else { &placed };
+    let drawn = if same_ink(&placed, ordered) { ordered } else { &placed };
     let certificate = verify::certify(machine, drawn, &header, request.tolerance_mm, || {
         trajectory.rows().enumerate().map(|(done, row)| {
             if (done as u64).is_multiple_of(PROGRESS_ROWS) {
@@ -160,17 +175,7 @@ pub fn compile<'a>(
             (row.row, Some(row.exact))
         })
     });
-    Ok(Compiled {
-        trajectory,
-        header,
-        placement,
-        placed,
-        ordered,
-        beyond_sheet_mm,
-        ordering,
-        strokes,
-        certificate,
-    })
+    Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
 }
 
 /// Whether two drawings consist of exactly the same pieces, in whatever order and direction, with the same pens.

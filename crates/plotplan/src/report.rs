@@ -34,6 +34,7 @@ pub fn summary(compiled: &Compiled<'_>) -> Value {
         "drawing_s": times.drawing,
         "travel_s": times.travel,
         "lifting_s": times.lifting,
+        "limited_by_s": limited_by(compiled).into_iter().map(|(what, time)| (what, json!(time))).collect::<serde_json::Map<_, _>>(),
         "pen_up_share": (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
         "placement": compiled.placement.as_coeffs(),
         "ordering": compiled.ordering.as_ref().map(|report| json!({
@@ -131,6 +132,7 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
         clock(times.travel),
         clock(times.lifting)
     );
+    text.push_str(&limited_by_text(compiled));
     if let Some(report) = &compiled.ordering {
         let _ = writeln!(
             text,
@@ -143,6 +145,32 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
         );
     }
     text
+}
+
+/// What kept the drawing time from being shorter, s; the longest first.
+fn limited_by(compiled: &Compiled<'_>) -> Vec<(String, f64)> {
+    let limiting = compiled.trajectory.limiting();
+    let mut by =
+        vec![("the pen's speed".to_owned(), limiting.pen), ("rows in turns".to_owned(), limiting.rows)];
+    for (k, motor) in compiled.header.motors.iter().enumerate() {
+        by.push((format!("speed of {}", motor.name), limiting.speed[k]));
+        by.push((format!("acceleration of {}", motor.name), limiting.acceleration[k]));
+        by.push((format!("acceleration of {} in corners and curves", motor.name), limiting.turning[k]));
+    }
+    by.retain(|(_, time)| *time > 0.0);
+    by.sort_by(|a, b| b.1.total_cmp(&a.1));
+    by
+}
+
+fn limited_by_text(compiled: &Compiled<'_>) -> String {
+    let by = limited_by(compiled);
+    let total: f64 = by.iter().map(|(_, time)| time).sum();
+    let shares = by.iter().map(|(what, time)| (what, 100.0 * time / total));
+    let shares: Vec<String> = shares
+        .filter(|(_, share)| *share >= 1.0)
+        .map(|(what, share)| format!("{what} {share:.0} %"))
+        .collect();
+    if shares.is_empty() { String::new() } else { format!("drawing is limited by: {}\n", shares.join(", ")) }
 }
 
 /// A certificate, for people.
@@ -171,17 +199,22 @@ fn details(certificate: &Certificate) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "  tick floor of this machine here: {:.4} mm worst, {:.4} mm RMS",
+        "  drawing resolution of this machine here (half a tick): {:.4} mm worst, {:.4} mm RMS",
         certificate.tick_floor.worst_mm, certificate.tick_floor.rms_mm
     );
     for peak in &certificate.motors {
         let _ = writeln!(
             text,
-            "  motor {}: speed at most {:.1} % of its limit, acceleration {:.1} %",
+            "  motor {}: speed at most {:.1} % of its limit (99.9 %: {:.1}), acceleration {:.1} % (99.9 %: {:.1})",
             peak.name,
             100.0 * peak.speed_share,
-            100.0 * peak.acceleration_share
+            100.0 * peak.speed_share_p999,
+            100.0 * peak.acceleration_share,
+            100.0 * peak.acceleration_share_p999
         );
+    }
+    if let Some(rounding) = certificate.largest_rounding {
+        let _ = writeln!(text, "  no drift: every row is within {rounding:.3} ticks of the exact position");
     }
     for failure in &certificate.failures {
         let _ = writeln!(text, "  FAILED: {failure}");

@@ -52,11 +52,10 @@ pub(super) fn run(python: &str) -> Result<bool> {
     let tenfold = read(&workload::points(10 * POINTS))?;
     println!("workload: {} points, {length:.3} mm, one stroke, as HPGL", points.len());
 
-    let settings =
-        Settings { tolerance: TOLERANCE, period_us: PERIOD_US, park: None, pen_speeds: Vec::new() };
-    let (trajectory, planning) = fastest(|| planner::plan(&machine, &once, &settings));
+    let settings = Settings::new(TOLERANCE, PERIOD_US);
+    let (trajectory, planning) = fastest(|| planner::plan(&machine, once.clone(), &settings));
     let trajectory = trajectory?;
-    let (tenfold_plan, tenfold_planning) = fastest(|| planner::plan(&machine, &tenfold, &settings));
+    let (tenfold_plan, tenfold_planning) = fastest(|| planner::plan(&machine, tenfold.clone(), &settings));
     let tenfold_plan = tenfold_plan?;
     let peaks = Peaks::of(&machine, &trajectory);
 
@@ -67,7 +66,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
     let arm = arm()?;
     let mut fitted = once.clone();
     fitted.transform(place(&arm, &once, &Wish { rotate: 0.0, size: Size::Fit })?);
-    let arm_trajectory = planner::plan(&arm, &fitted, &settings)?;
+    let arm_trajectory = planner::plan(&arm, fitted, &settings)?;
     let arm_emission = self::emission(&arm, &arm_trajectory)?;
 
     println!("{:<14} {:>10} {:>10} {:>10}", "CPU ms", "points", "10 times", "exponent");
@@ -79,7 +78,12 @@ pub(super) fn run(python: &str) -> Result<bool> {
     ] {
         println!("{name:<14} {:>10.2} {:>10.2} {:>10.3}", 1e3 * one, 1e3 * ten, (ten / one).log10());
     }
-    println!("cells: {} of {} joint paths; {} phases", stages.cells, stages.paths.len(), stages.profiles.iter().map(|p| p.phases.len()).sum::<usize>());
+    println!(
+        "cells: {} of {} joint paths; {} phases",
+        stages.cells,
+        stages.paths.len(),
+        stages.profiles.iter().map(|p| p.phases.len()).sum::<usize>()
+    );
     println!("finite differences of {PERIOD_US} us: speed {:.5} of the limit", peaks.speed);
     let tick_room = ACCELERATION * TICKS_PER_MM * (PERIOD_US as f64 * 1e-6).powi(2) + 2.0;
     let goals = [

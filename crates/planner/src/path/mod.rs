@@ -71,6 +71,11 @@ pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
         .collect()
 }
 
+/// Every piece of a stroke as a section of its own: the pen rests at all vertices but those that lie on a straight line.
+pub fn vertex_to_vertex(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
+    clean(stroke, budget.chord).into_iter().map(|curve| parametrise(vec![curve])).collect()
+}
+
 /// The stroke's pieces without those of no length, straight ones in line joined, cusped curves as chords.
 fn clean(stroke: &Stroke, chord_tolerance: f64) -> Vec<Segment> {
     let mut pieces: Vec<Segment> = Vec::with_capacity(stroke.segment_count());

@@ -11,7 +11,7 @@
 
 use kinematics::Machine;
 
-use super::{Limiting, Profile, SpeedCap, bounds::Bounds};
+use super::{Profile, SpeedCap, bounds::Bounds};
 use crate::lift::{Cell, Course, JointPath};
 
 /// How many of the path's own cells are refined together: memory and cost follow it, and its ends are held to the
@@ -31,12 +31,9 @@ const IDLE: f64 = 2e-3;
 const ROUNDS: usize = 8;
 
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    let hold = |cell: &Cell| Held { bounds: Bounds::new(machine, cell, cap), cell: *cell };
-    let mut coarse = Law::default();
-    coarse.cells.extend(path.cells.iter().map(hold));
-    coarse.sweep(0.0, 0.0);
+    let coarse = Law::of(machine, path, cap);
+    let mut profile = Profile::new();
     let mut window = Law::default();
-    let mut profile = Profile { phases: Vec::new(), duration: 0.0, limiting: Limiting::default() };
     let (mut from, mut speed) = (0, 0.0);
     while from < path.cells.len() {
         let to = coarse.window_end(from + WINDOW);
@@ -48,6 +45,13 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
         window.emit(&mut profile);
         from = to;
     }
+    profile
+}
+
+/// With no more cells than the path has, but for such as begin and end at rest.
+pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
+    let mut profile = Profile::new();
+    Law::of(machine, path, cap).emit(&mut profile);
     profile
 }
 
@@ -69,6 +73,14 @@ struct Law {
 }
 
 impl Law {
+    /// Over all of a path, from rest to rest.
+    fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
+        let hold = |cell: &Cell| Held { bounds: Bounds::new(machine, cell, cap), cell: *cell };
+        let mut law = Self { cells: path.cells.iter().map(hold).collect(), ..Self::default() };
+        law.sweep(0.0, 0.0);
+        law
+    }
+
     /// Finds b at every node of all cells in a row: from `start`, or the largest b from which there is a way if that is
     /// less, to at most `end`.
     fn sweep(&mut self, start: f64, end: f64) {
@@ -158,11 +170,9 @@ impl Law {
     }
 
     fn emit(&self, profile: &mut Profile) {
-        let first = profile.phases.len();
         for (held, from, to) in self.runs() {
-            held.bounds.phases(&held.cell, from, to, &mut profile.phases, &mut profile.limiting);
+            held.bounds.phases(&held.cell, from, to, profile);
         }
-        profile.duration += profile.phases[first..].iter().map(|phase| phase.duration).sum::<f64>();
     }
 }
 

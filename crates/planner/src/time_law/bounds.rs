@@ -16,7 +16,7 @@
 
 use kinematics::Machine;
 
-use super::{Limiting, Phase, SpeedCap};
+use super::{Limiting, Phase, Profile, SpeedCap};
 use crate::lift::Cell;
 
 /// The condition `|p u + r b| <= 1`, p >= 0, with b at the cell's start.
@@ -161,16 +161,16 @@ impl Bounds {
         }
     }
 
-    /// The phases over the cell from b0 to b1, and what limits them.
-    pub(super) fn phases(&self, cell: &Cell, b0: f64, b1: f64, phases: &mut Vec<Phase>, limiting: &mut Limiting) {
+    /// Adds the phases over the cell from b0 to b1, and what limits them.
+    pub(super) fn phases(&self, cell: &Cell, b0: f64, b1: f64, profile: &mut Profile) {
         let mut start = cell.start;
         let mut push = |length: f64, from: f64, to: f64| {
             if length > 0.0 && from + to > 0.0 {
                 let (slow, fast) = (from.sqrt(), to.sqrt());
                 let duration = 2.0 * length / (slow + fast);
                 let acceleration = (fast - slow) / duration;
-                phases.push(Phase { piece: cell.piece, start, speed: slow, acceleration, duration });
-                self.limit(from, to, duration, limiting);
+                profile.push(Phase::even(cell.piece, start, slow, acceleration, duration));
+                self.limit(from, to, duration, &mut profile.limiting);
             }
             start += length;
         };
@@ -197,7 +197,8 @@ impl Bounds {
             let (m1, m2) = (p + self.twice * r.abs(), r.abs());
             b = b.min((self.twice + m1 * (b0 + b1)) / (2.0 * m1 + self.twice * m2));
         }
-        let strongest = self.strips.iter().map(|Strip { p, r }| (1.0 - r.abs() * b) / (p + self.twice * r.abs()));
+        let strongest =
+            self.strips.iter().map(|Strip { p, r }| (1.0 - r.abs() * b) / (p + self.twice * r.abs()));
         let u = strongest.fold(f64::INFINITY, f64::min);
         let length = 0.5 * self.twice;
         let (up, down) = ((b - b0) / (2.0 * u), (b - b1) / (2.0 * u));
@@ -227,7 +228,8 @@ impl Bounds {
             let u = (b1 - b0) / self.twice;
             let along = (p - share * self.twice * r) * u;
             let turning = r * (b0 + share * (b1 - b0));
-            let of = if turning.abs() > along.abs() { &mut limiting.turning } else { &mut limiting.acceleration };
+            let of =
+                if turning.abs() > along.abs() { &mut limiting.turning } else { &mut limiting.acceleration };
             of[k] += duration;
         }
     }

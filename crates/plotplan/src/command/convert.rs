@@ -84,12 +84,17 @@ fn plan(
         }
         ReportForm::Json => format!("{}\n", json!({ "summary": summary, "certificate": certificate })),
     };
-    if !compiled.certificate.holds {
-        terminal::error(
-            "the plan does not hold its certificate and is not written; please report this drawing",
-        );
+    if !compiled.may_be_written(request.allow_over_limit) {
+        terminal::error(if compiled.may_be_written(true) {
+            "the plan breaks the motors' limits and is not written; a longer --segment-time may keep them, --allow-over-limit writes it as it is"
+        } else {
+            "the plan does not hold its certificate and is not written; please report this drawing"
+        });
         terminal::say(&said);
         return Err(Failure::Refused);
+    }
+    if !compiled.certificate.holds {
+        terminal::warning("the plan breaks the motors' limits, which was allowed");
     }
     if super::firmware::is_for(arguments.format) {
         super::firmware::write(arguments, &machine.machine, &compiled)?;

@@ -90,7 +90,7 @@ fn put(
             let options = gcode_options(flavour(other), machine, arguments.pen);
             let speeds = stroke_speeds(machine, compiled);
             let park = machine.geometry().forward(&machine.start());
-            gcode::write(&gcode::commands(&compiled.ordered, &speeds, park, &options), out)
+            gcode::write(&gcode::commands(compiled.ordered(), &speeds, park, &options), out)
         }
     }
 }
@@ -153,7 +153,7 @@ fn stroke_speeds(machine: &Machine, compiled: &Compiled<'_>) -> Vec<f64> {
         before = Some(row);
     }
     let most = machine.pen().max_speed;
-    let strokes = compiled.ordered.strokes.iter().enumerate();
+    let strokes = compiled.ordered().strokes.iter().enumerate();
     strokes
         .map(|(index, stroke)| {
             let seconds = times.get(index).map_or(0.0, |us| *us as f64 * 1e-6);
@@ -190,7 +190,7 @@ fn suits(format: Format, machine: &Machine) -> Result<(), Failure> {
 /// What the format cannot carry of this plan, in sentences.
 fn losses(format: Format, compiled: &Compiled<'_>) -> Vec<String> {
     let mut losses = Vec::new();
-    let pens = compiled.ordered.pens();
+    let pens = compiled.ordered().pens();
     let pauses = matches!(
         format,
         Format::GcodeGrbl

@@ -1,0 +1,154 @@
+//! One stroke: where the machine can draw it, and how it moves along it.
+
+use drawing::{Point, Stroke};
+use kinematics::{Joints, Machine, OutOfReach, Unreachable};
+
+use crate::{
+    Settings,
+    lift::{Course, JointPath},
+    path::{Budget, Section, sections, vertex_to_vertex},
+    settings::{Law, Shares},
+    time_law::{Profile, SpeedCap, eased, profile},
+};
+
+/// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops and pen events fall on
+/// rows: between rows motors move linearly, and a stop between two rows would be cut.
+#[derive(Clone, Debug)]
+pub(crate) struct Move {
+    pub(crate) course: Course,
+    pub(crate) profile: Profile,
+    /// The pose at its end.
+    pub(crate) end: Joints,
+    pub(crate) periods: u64,
+}
+
+/// A stroke as drawn from one of its poses.
+#[derive(Clone, Debug)]
+pub(crate) struct Drawn {
+    pub(crate) start: Joints,
+    /// None for a dot.
+    pub(crate) moves: Vec<Move>,
+}
+
+impl Drawn {
+    pub(crate) fn end(&self) -> Joints {
+        self.moves.last().map_or(self.start, |last| last.end)
+    }
+}
+
+/// What all strokes of a plan are planned with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StrokePlanner<'a> {
+    pub(crate) machine: &'a Machine,
+    pub(crate) settings: &'a Settings,
+    pub(crate) shares: Shares,
+}
+
+impl StrokePlanner<'_> {
+    /// Plans a stroke from the pose nearest to `near` from which all of it can be drawn: a stroke around the base may run
+    /// into a joint limit from one turn and not from another. `ready` is what was found for a pose before.
+    pub(crate) fn draw(
+        &self,
+        stroke: &Stroke,
+        near: &Joints,
+        ready: Option<Result<Drawn, OutOfReach>>,
+    ) -> Result<Drawn, OutOfReach> {
+        let start = stroke.start();
+        self.machine.check_point(start)?;
+        let poses = self.machine.poses(start, near).map_err(|fault| OutOfReach { point: start, fault })?;
+        let mut first_error = None;
+        if let (Some(Ok(drawn)), Some(pose)) = (ready, poses.first())
+            && drawn.start == *pose
+        {
+            return Ok(drawn);
+        }
+        for pose in poses {
+            match self.draw_from(stroke, pose) {
+                Ok(drawn) => return Ok(drawn),
+                Err(error) => first_error = first_error.or(Some(error)),
+            }
+        }
+        let fault = kinematics::Fault::Singular { dexterity: 0.0, min: self.machine.parts().min_dexterity };
+        Err(first_error.unwrap_or(OutOfReach { point: start, fault }))
+    }
+
+    /// The pose near `near` in which a stroke would most likely begin, and one in which it would end.
+    pub(crate) fn guess(&self, stroke: &Stroke, near: &Joints) -> Option<(Joints, Joints)> {
+        let pose = *self.machine.poses(stroke.start(), near).ok()?.first()?;
+        let mut end = pose;
+        for vertex in stroke.vertices().iter() {
+            end = self.machine.pose_near(*vertex, &end).ok()?;
+        }
+        Some((pose, end))
+    }
+
+    /// Plans a stroke from a pose.
+    ///
+    /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
+    /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
+    pub(crate) fn draw_from(&self, stroke: &Stroke, pose: Joints) -> Result<Drawn, OutOfReach> {
+        let exact = Budget { simplify: 0.0, blend: 0.0, ..self.shares.path };
+        match self.settings.law {
+            Law::TimeOptimal => {
+                let sections = |budget: &Budget| sections(stroke, budget);
+                self.follow(stroke, pose, sections(&self.shares.path))
+                    .or_else(|_| self.follow(stroke, pose, sections(&exact)))
+            }
+            Law::Trapezoid | Law::Eased { .. } => self.follow(stroke, pose, vertex_to_vertex(stroke, &exact)),
+        }
+    }
+
+    fn follow(&self, stroke: &Stroke, start: Joints, sections: Vec<Section>) -> Result<Drawn, OutOfReach> {
+        let mut drawn = Drawn { start, moves: Vec::with_capacity(sections.len()) };
+        let speed = self.settings.speed_of(self.machine, stroke.pen);
+        for section in sections {
+            let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
+            let path = JointPath::lift(self.machine, section, drawn.end(), self.settings.tolerance)?;
+            let end = self.end_pose(&path, end)?;
+            drawn.moves.push(self.movement(path, end, speed));
+        }
+        Ok(drawn)
+    }
+
+    /// The pose at the end of a drawn path, unwrapped along its cells.
+    fn end_pose(&self, path: &JointPath, end: Point) -> Result<Joints, OutOfReach> {
+        let along = path.cells.iter().fold(path.course.start(), |near, cell| {
+            path.course.pose(self.machine, cell.piece, cell.start, &near)
+        });
+        let fault = |unreachable: Unreachable| OutOfReach { point: end, fault: unreachable.into() };
+        self.machine.pose_near(end, &along).map_err(fault)
+    }
+
+    /// Lays the time law upon a path.
+    fn movement(&self, path: JointPath, end: Joints, pen: f64) -> Move {
+        let period = self.period();
+        if let (Law::Eased { ease, segment_time }, Course::Drawn(_, section)) =
+            (self.settings.law, &path.course)
+        {
+            let periods = (segment_time / period).round().max(1.0) as u64;
+            let length = section.iter().map(crate::path::Piece::length).sum();
+            let profile = eased(ease, length, periods as f64 * period);
+            return Move { course: path.course, profile, end, periods };
+        }
+        let cap = SpeedCap { pen, row_deviation: self.shares.row, period };
+        let profile = profile(self.machine, &path, &cap);
+        let periods = whole_periods(profile.duration, period).max(1);
+        Move { course: path.course, profile, end, periods }
+    }
+
+    /// The way with the pen up from pose to pose; nothing where there is none.
+    pub(crate) fn travel(&self, from: Joints, to: Joints) -> Option<Move> {
+        let path = JointPath::travel(self.machine, from, to)?;
+        Some(self.movement(path, to, f64::INFINITY))
+    }
+
+    /// Time between rows, s.
+    pub(crate) fn period(&self) -> f64 {
+        self.settings.period_us as f64 * 1e-6
+    }
+}
+
+/// Whole periods that hold `duration`; a hair over a whole number is rounding, not another period.
+pub(crate) fn whole_periods(duration: f64, period: f64) -> u64 {
+    (duration / period - 1e-9).ceil().max(0.0) as u64
+}

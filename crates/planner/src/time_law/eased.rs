@@ -1,0 +1,75 @@
+//! Laws that give every piece the same time, whatever the motors can: those of a drawing machine's own firmware.
+//!
+//! With x from 0 to 1 over the time T of a piece of length L, the way is L y(x). Source: seed 3's report.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::{Phase, Profile};
+
+/// How the way goes with time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ease {
+    /// y = x: evenly, from a jump in speed to another.
+    Linear,
+    /// y = sin(pi x / 2): from a jump in speed, pi/2 of the mean, slower and slower to rest.
+    SineOut,
+    /// y = 2 x² below one half, then 1 - 2 (1 - x)²: from rest to rest, at most twice the mean speed.
+    QuadraticInOut,
+}
+
+/// Over a piece of this length (in the path's parameter) in `time` s.
+pub fn eased(ease: Ease, length: f64, time: f64) -> Profile {
+    let mean = length / time;
+    let mut profile = Profile::new();
+    match ease {
+        Ease::Linear => profile.push(Phase::even(0, 0.0, mean, 0.0, time)),
+        Ease::SineOut => {
+            // s'' = -omega² s with omega = pi / (2 T).
+            let omega = FRAC_PI_2 / time;
+            let growth = -omega * omega;
+            profile.push(Phase { growth, ..Phase::even(0, 0.0, length * omega, 0.0, time) });
+        }
+        Ease::QuadraticInOut => {
+            let acceleration = 4.0 * mean / time;
+            profile.push(Phase::even(0, 0.0, 0.0, acceleration, 0.5 * time));
+            profile.push(Phase::even(0, 0.5 * length, 2.0 * mean, -acceleration, 0.5 * time));
+        }
+    }
+    profile
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a law is at time t.
+    fn at(profile: &Profile, t: f64) -> f64 {
+        let mut since = t;
+        for phase in &profile.phases {
+            if since <= phase.duration {
+                return phase.way(since);
+            }
+            since -= phase.duration;
+        }
+        f64::NAN
+    }
+
+    #[test]
+    fn laws_go_as_they_are_defined() {
+        for (ease, y) in [
+            (Ease::Linear, (|x| x) as fn(f64) -> f64),
+            (Ease::SineOut, |x| libm::sin(FRAC_PI_2 * x)),
+            (Ease::QuadraticInOut, |x| {
+                if x < 0.5 { 2.0 * x * x } else { 1.0 - 0.5 * (2.0 - 2.0 * x) * (2.0 - 2.0 * x) }
+            }),
+        ] {
+            let profile = eased(ease, 7.0, 1.5);
+            assert!((profile.duration - 1.5).abs() < 1e-12);
+            for k in 0..=100 {
+                let x = f64::from(k) / 100.0;
+                let off = at(&profile, (1.5 * x).min(profile.duration)) - 7.0 * y(x);
+                assert!(off.abs() < 1e-11, "{ease:?} at {x}: off by {off}");
+            }
+        }
+    }
+}
