@@ -61,6 +61,16 @@ impl Segment {
         }
     }
 
+    /// Third derivative by the parameter at `t`, mm.
+    pub fn third_derivative(&self, t: f64) -> Vec2 {
+        match self {
+            Self::Line(_) => Vec2::ZERO,
+            // a cos u + b sin u turned on by half a turn twice over: -sweep² of the first derivative.
+            Self::Arc(arc) => -arc.sweep * arc.sweep * arc.derivatives(t).0,
+            Self::Cubic(c) => 6.0 * ((c.p3 - c.p0) - 3.0 * (c.p2 - c.p1)),
+        }
+    }
+
     /// The part between `t0` and `t1`.
     pub fn part(&self, t0: f64, t1: f64) -> Self {
         match self {

@@ -72,6 +72,11 @@ impl Geometry {
         each!(self, g => g.path_derivatives(q, first, second))
     }
 
+    /// Third derivative of the joints along such a path, on which the pen also has the derivative `third` (mm).
+    pub fn path_third_derivative(&self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Joints {
+        each!(self, g => g.path_third_derivative(q, first, second, third))
+    }
+
     /// How much the pen's path bends while the joints move evenly from `from` to `to`: a bound on the length of
     /// d²p/du², u from 0 to 1, mm.
     ///

@@ -285,6 +285,11 @@ impl Machine {
         (self.to_ticks * q_1, self.to_ticks * q_2)
     }
 
+    /// Third derivative of the motors' positions (ticks) along such a path, on which the pen also has the derivative `third`.
+    pub fn motor_third_derivative(&self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Vector2<f64> {
+        self.to_ticks * self.parts.geometry.path_third_derivative(q, first, second, third)
+    }
+
     /// How far the pen can be from where it should be because motors only take whole ticks: the largest displacement
     /// over half a tick more or less on both motors, mm.
     pub fn tick_floor(&self, q: &Joints) -> f64 {

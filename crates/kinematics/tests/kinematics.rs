@@ -114,6 +114,26 @@ proptest! {
         prop_assert!(((ahead - 2.0 * q + behind) / (h * h) - q_2).norm() < 2e-3 * scale);
     }
 
+    /// Along p(s) = p0 + v s + a s²/2 + j s³/6 the third derivative must equal differences of the second.
+    #[test]
+    fn third_derivatives_agree_with_differences(
+        g in geometry(), u in -1.0..1.0f64, v in -0.9..0.9f64, direction in 0.0..6.2f64, bend in -0.02..0.02f64,
+        jerk in (-1e-3..1e-3f64, -1e-3..1e-3f64),
+    ) {
+        let q = pose(&g, u, v);
+        let p = g.forward(&q);
+        let first = Vec2::new(libm::cos(direction), libm::sin(direction));
+        let (second, third) = (bend * Vec2::new(-first.y, first.x), Vec2::new(jerk.0, jerk.1));
+        let h = 1e-3;
+        let second_at = |s: f64| {
+            let there = g.inverse(p + s * first + 0.5 * s * s * second + s * s * s / 6.0 * third).unwrap();
+            g.path_derivatives(&there, first + s * second + 0.5 * s * s * third, second + s * third).1
+        };
+        let difference = (second_at(h) - second_at(-h)) / (2.0 * h);
+        let q_3 = g.path_third_derivative(&q, first, second, third);
+        prop_assert!((difference - q_3).norm() < 1e-4 * (1e-4 + q_3.norm()), "{} {}", difference, q_3);
+    }
+
     /// |f(u) - chord(u)| <= u (1 - u) / 2 * max |f''|: linear joint motion stays within bend / 8 of the chord.
     #[test]
     fn linear_joint_motion_leaves_the_chord_by_no_more_than_the_bound(

@@ -6,7 +6,7 @@ use std::path::Path;
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, TwoLink};
 use planner::lift::{Cell, Course};
-use planner::path::{Budget, Section, sections};
+use planner::path::{Budget, Corner, Section, sections};
 use planner::time_law::{SpeedCap, profile};
 use planner::{JointPath, Settings, plan};
 
@@ -107,7 +107,8 @@ fn corner() -> String {
     let points = [(0.0, 0.0), (1.35, 0.0), (1.35, 0.9), (2.75, 1.25)].map(Point::from);
     let stroke = polyline(&points);
     let deviation = 0.1;
-    let budget = Budget { chord: 0.01, simplify: 0.0, blend: deviation, row: f64::INFINITY };
+    let budget =
+        Budget { chord: 0.01, simplify: 0.0, blend: deviation, corner: Corner::Parabola, row: f64::INFINITY };
     let mut picture = Picture::new(Rect::new(20.0, 20.0, 620.0, 340.0), Rect::new(-0.1, -0.2, 2.9, 1.4));
     // Everything within the tolerance, as one broad line with round joints.
     let broad = 2.0 * deviation * 200.0;
@@ -139,7 +140,8 @@ fn speed() -> Result<String, Failure> {
         polyline(&[(50.0, 50.0), (56.0, 50.0), (56.0, 54.0), (59.0, 51.0), (62.0, 51.0)].map(Point::from));
     let down = -std::f64::consts::FRAC_PI_2;
     stroke.arc(EllipticArc::circular(Point::new(62.0, 53.5), 2.5, down, std::f64::consts::PI));
-    let budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.05, row: f64::INFINITY };
+    let budget =
+        Budget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: Corner::Parabola, row: f64::INFINITY };
     let cap = SpeedCap { pen: machine.pen().max_speed, row_deviation: f64::INFINITY, period: 1e-3 };
     let (mut limit, mut driven) = (Vec::new(), Vec::new());
     let mut way = 0.0;

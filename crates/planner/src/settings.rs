@@ -4,7 +4,11 @@ use drawing::{Pen, Point};
 use kinematics::{Joints, Machine};
 use nalgebra::Vector2;
 
-use crate::{PlanError, path::Budget, time_law::Ease};
+use crate::{
+    PlanError,
+    path::{Budget, Corner},
+    time_law::Ease,
+};
 
 /// How a plan is made.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +100,12 @@ impl Shares {
         let path = tolerance - row;
         let simplify = SIMPLIFY_SHARE * path;
         let marked = if needed > share { row } else { f64::INFINITY };
-        Self { row, path: Budget { chord: 0.5 * path, simplify, blend: path - simplify, row: marked } }
+        let jerk = machine.motors().iter().any(|motor| motor.max_jerk.is_some());
+        let corner = if jerk { Corner::Spline } else { Corner::Parabola };
+        Self {
+            row,
+            path: Budget { chord: 0.5 * path, simplify, blend: path - simplify, corner, row: marked },
+        }
     }
 }
 

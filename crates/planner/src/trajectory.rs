@@ -156,7 +156,7 @@ pub fn check_reach(machine: &Machine, drawing: &Drawing) -> Result<(), PlanError
     Ok(())
 }
 
-impl<'a> Trajectory<'a> {
+impl Trajectory<'_> {
     /// The drawing that is drawn, machine mm.
     pub fn drawing(&self) -> &Drawing {
         &self.drawing

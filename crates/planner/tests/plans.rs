@@ -9,7 +9,12 @@ use proptest::prelude::*;
 mod machines;
 
 fn machine() -> impl Strategy<Value = Machine> {
-    prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())]
+    let plain = prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())];
+    let build_up = prop_oneof![2 => Just(None), 1 => (0.002..0.1f64).prop_map(Some)];
+    (plain, build_up).prop_map(|(machine, build_up)| match build_up {
+        Some(build_up) => machines::with_jerk(&machine, build_up),
+        None => machine,
+    })
 }
 
 fn polyline(points: Vec<Point>) -> Stroke {
@@ -66,7 +71,7 @@ fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {
 
 /// Rows with the pauses filled in, so that all are one period apart.
 fn filled(rows: &[ExactRow], period_us: u64) -> Vec<[f64; 2]> {
-    let mut all = vec![rows[0].exact; 2]; // at rest before the first row
+    let mut all = vec![rows[0].exact; 3]; // at rest before the first row
     for pair in rows.windows(2) {
         let periods = (pair[1].row.t_us - pair[0].row.t_us) / period_us;
         assert_eq!((pair[1].row.t_us - pair[0].row.t_us) % period_us, 0);
@@ -78,7 +83,7 @@ fn filled(rows: &[ExactRow], period_us: u64) -> Vec<[f64; 2]> {
         }
         all.push(pair[1].exact);
     }
-    all.extend([rows[rows.len() - 1].exact; 2]);
+    all.extend([rows[rows.len() - 1].exact; 3]);
     all
 }
 
@@ -98,7 +103,7 @@ fn to_polyline(p: Point, line: &[Point]) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
-    /// |first difference| <= v T and |second difference| <= a T² in the exact positions of every row, and the pen's
+    /// |first difference| <= v T, |second difference| <= a T² and |third difference| <= j T³ in the exact positions of every row, and the pen's
     /// continuous path within the tolerance of the drawing, both ways.
     #[test]
     fn limits_and_tolerance_hold(
@@ -131,6 +136,14 @@ proptest! {
                     acceleration <= motor.max_acceleration * (1.0 + 1e-6) + 1e-6 / (period * period),
                     "acceleration {} of {}", acceleration, motor.max_acceleration
                 );
+            }
+        }
+
+        for (k, motor) in machine.motors().iter().enumerate() {
+            let Some(limit) = motor.max_jerk else { continue };
+            for w in all.windows(4) {
+                let jerk = (w[3][k] - 3.0 * w[2][k] + 3.0 * w[1][k] - w[0][k]).abs() / (period * period * period);
+                prop_assert!(jerk <= limit * (1.0 + 1e-3) + 1e-6 / (period * period * period), "jerk {} of {}", jerk, limit);
             }
         }
 

@@ -20,14 +20,15 @@ use kinematics::{Joints, Machine};
 use nalgebra::Vector2;
 use planner::JointPath;
 use planner::lift::Course;
-use planner::path::{Budget, Piece, sections};
+use planner::path::{Budget, Corner, Piece, sections};
 use planner::time_law::{SpeedCap, profile};
 use proptest::prelude::*;
 
 mod machines;
 
 /// Corners by 0.05 mm, nothing else: the rows' share of the tolerance is another matter.
-const BUDGET: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.05, row: f64::INFINITY };
+const BUDGET: Budget =
+    Budget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: Corner::Parabola, row: f64::INFINITY };
 
 /// By how much a profile may take longer than the best, as a share.
 const EXCESS: f64 = 0.002;

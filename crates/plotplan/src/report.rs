@@ -100,6 +100,12 @@ fn motor(peak: &MotorPeak) -> Value {
         "acceleration_limit": peak.acceleration_limit,
         "acceleration_share": peak.acceleration_share,
         "acceleration_share_p999": peak.acceleration_share_p999,
+        "jerk": peak.jerk.map(|peak| json!({
+            "jerk": peak.jerk,
+            "limit": peak.limit,
+            "share": peak.share,
+            "share_p999": peak.share_p999,
+        })),
     })
 }
 
@@ -155,6 +161,7 @@ fn limited_by(compiled: &Compiled<'_>) -> Vec<(String, f64)> {
     for (k, motor) in compiled.header.motors.iter().enumerate() {
         by.push((format!("speed of {}", motor.name), limiting.speed[k]));
         by.push((format!("acceleration of {}", motor.name), limiting.acceleration[k]));
+        by.push((format!("jerk of {}", motor.name), limiting.jerk[k]));
         by.push((format!("acceleration of {} in corners and curves", motor.name), limiting.turning[k]));
     }
     by.retain(|(_, time)| *time > 0.0);
@@ -203,7 +210,7 @@ fn details(certificate: &Certificate) -> String {
         certificate.tick_floor.worst_mm, certificate.tick_floor.rms_mm
     );
     for peak in &certificate.motors {
-        let _ = writeln!(
+        let _ = write!(
             text,
             "  motor {}: speed at most {:.1} % of its limit (99.9 %: {:.1}), acceleration {:.1} % (99.9 %: {:.1})",
             peak.name,
@@ -212,6 +219,11 @@ fn details(certificate: &Certificate) -> String {
             100.0 * peak.acceleration_share,
             100.0 * peak.acceleration_share_p999
         );
+        if let Some(jerk) = &peak.jerk {
+            let _ =
+                write!(text, ", jerk {:.1} % (99.9 %: {:.1})", 100.0 * jerk.share, 100.0 * jerk.share_p999);
+        }
+        text.push('\n');
     }
     if let Some(rounding) = certificate.largest_rounding {
         let _ = writeln!(text, "  no drift: every row is within {rounding:.3} ticks of the exact position");

@@ -107,4 +107,19 @@ pub struct MotorPeak {
     /// 99.9 % of the rows about which this motor moves have a smaller share of the acceleration limit;
     /// overstated by 1/64 of itself at most.
     pub acceleration_share_p999: f64,
+    /// The same for jerk, where the plan states a limit for it.
+    pub jerk: Option<JerkPeak>,
+}
+
+/// What one motor was seen to do to its jerk: with steps of one period `T` the limit is `|third difference| <= j T^3 + 4 ticks`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JerkPeak {
+    /// Largest third difference over time cubed, ticks/s³; includes the rounding of its four ticks.
+    pub jerk: f64,
+    /// The limit the plan states, ticks/s³.
+    pub limit: f64,
+    /// Largest share of the limit with its rounding allowance.
+    pub share: f64,
+    /// 99.9 % of the rows about which this motor moves have a smaller share; overstated by 1/64 of itself at most.
+    pub share_p999: f64,
 }

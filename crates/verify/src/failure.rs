@@ -120,6 +120,18 @@ pub enum Violation {
         /// The limit itself, ticks/s².
         limit: f64,
     },
+    /// A third difference is larger than the jerk limit allows.
+    #[error("motor {motor} jerks at {jerk:.1} ticks/s^3 where {allowed:.1} are allowed (limit {limit:.1})")]
+    Jerk {
+        /// The motor.
+        motor: String,
+        /// Its jerk, ticks/s³.
+        jerk: f64,
+        /// The limit with the rounding allowance, ticks/s³.
+        allowed: f64,
+        /// The limit itself, ticks/s³.
+        limit: f64,
+    },
     /// The motors move before the pen has finished its own movement.
     #[error("the motors move {early_us} us before pen {pen} has been {motion}")]
     MovesDuringPen {
@@ -199,12 +211,13 @@ fn stage(rounded: bool) -> &'static str {
 }
 
 impl Violation {
-    /// Whether it is about a motor's speed or acceleration, which a plan may be allowed to break on purpose.
+    /// Whether it is about a motor's speed, acceleration or jerk, which a plan may be allowed to break on purpose.
     pub fn is_limit(&self) -> bool {
         matches!(
             self,
             Self::Speed { .. }
                 | Self::Acceleration { .. }
+                | Self::Jerk { .. }
                 | Self::RestAtStart { .. }
                 | Self::RestAtEnd { .. }
         )

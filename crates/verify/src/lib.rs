@@ -16,11 +16,12 @@
 mod certificate;
 mod failure;
 mod histogram;
+mod jerk;
 mod limits;
 mod target;
 mod trace;
 mod verifier;
 
-pub use certificate::{Certificate, Deviation, MotorPeak, Spread, TickFloor};
+pub use certificate::{Certificate, Deviation, JerkPeak, MotorPeak, Spread, TickFloor};
 pub use failure::{Failure, PenMotion, Place, Violation};
 pub use verifier::{ExactRow, Verifier, certify};

@@ -1,6 +1,6 @@
 //! One motor's column against its limits, in finite differences of whole ticks.
 
-use crate::{MotorPeak, histogram::Histogram};
+use crate::{JerkPeak, MotorPeak, histogram::Histogram, jerk::JerkCheck};
 
 /// A finite difference beyond its bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +49,8 @@ pub(crate) struct MotorCheck {
     acceleration_share: f64,
     speed_shares: Histogram,
     acceleration_shares: Histogram,
+    /// Where the motor states a limit for it.
+    jerk: Option<JerkCheck>,
 }
 
 /// Comparisons forgive what computing the bound itself may cost.
@@ -57,8 +59,10 @@ const ROUNDING: f64 = 1.0 + 1e-9;
 impl MotorCheck {
     pub(crate) fn new(motor: plan::Motor, period_us: u64) -> Self {
         let period_s = period_us.max(1) as f64 * 1e-6;
+        let jerk = motor.limits.jerk.map(|limit| JerkCheck::new(limit, period_us));
         Self {
             motor,
+            jerk,
             period_s,
             velocity: 0.0,
             step_s: period_s,
@@ -113,6 +117,16 @@ impl MotorCheck {
         exceeds(value, allowed)
     }
 
+    /// The same motion against the motor's jerk.
+    pub(crate) fn jerk(&mut self, dt_us: u64, difference: i64) -> Option<Excess> {
+        self.jerk.as_mut().and_then(|jerk| jerk.step(dt_us, difference))
+    }
+
+    /// The stop against the motor's jerk.
+    pub(crate) fn jerk_of_stop(&mut self) -> Option<Excess> {
+        self.jerk.as_mut().and_then(JerkCheck::stop)
+    }
+
     pub(crate) fn limits(&self) -> plan::Limits {
         self.motor.limits
     }
@@ -121,6 +135,12 @@ impl MotorCheck {
         MotorPeak {
             speed_share_p999: self.speed_shares.percentile(0.999, self.speed_share),
             acceleration_share_p999: self.acceleration_shares.percentile(0.999, self.acceleration_share),
+            jerk: self.jerk.map(|jerk| JerkPeak {
+                jerk: jerk.jerk,
+                limit: self.motor.limits.jerk.unwrap_or_default(),
+                share: jerk.share,
+                share_p999: jerk.share_p999(),
+            }),
             name: self.motor.name,
             speed: self.speed,
             acceleration: self.acceleration,

@@ -270,6 +270,9 @@ impl<'a> Verifier<'a> {
                 };
                 self.failures.note(violation, motor, excess.share(), here);
             }
+            if let Some(excess) = self.motors[motor].jerk(dt_us, difference) {
+                self.failures.note(self.jerk(motor, excess), motor, excess.share(), here);
+            }
         }
         if let Some(event) = self.event.filter(|event| moves && before.t_us < event.until_us) {
             let early_us = event.until_us - before.t_us;
@@ -299,6 +302,15 @@ impl<'a> Verifier<'a> {
             acceleration: excess.value,
             allowed: excess.allowed,
             limit: self.motors[motor].limits().acceleration,
+        }
+    }
+
+    fn jerk(&self, motor: usize, excess: Excess) -> Violation {
+        Violation::Jerk {
+            motor: self.motors[motor].name().to_owned(),
+            jerk: excess.value,
+            allowed: excess.allowed,
+            limit: self.motors[motor].limits().jerk.unwrap_or_default(),
         }
     }
 
@@ -409,6 +421,9 @@ impl<'a> Verifier<'a> {
                 let name = self.motors[motor].name().to_owned();
                 let violation = Violation::RestAtEnd { motor: name, share: excess.share() };
                 self.failures.note(violation, motor, excess.share(), here);
+            }
+            if let Some(excess) = self.motors[motor].jerk_of_stop() {
+                self.failures.note(self.jerk(motor, excess), motor, excess.share(), here);
             }
         }
         let Row { pen, ticks: found, .. } = last.row;

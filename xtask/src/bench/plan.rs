@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, TwoLink};
 use planner::lift::Course;
-use planner::path::{Budget, sections};
+use planner::path::{Budget, Corner, sections};
 use planner::placement::{Size, Wish, place};
 use planner::time_law::{Profile, SpeedCap, profile};
 use planner::{JointPath, Settings, Trajectory};
@@ -257,6 +257,7 @@ impl Stages {
             chord: 0.5 * TOLERANCE,
             simplify: 0.3 * TOLERANCE,
             blend: 0.7 * TOLERANCE,
+            corner: Corner::Parabola,
             row: f64::INFINITY,
         };
         let stroke = drawing.strokes.first().context("a workload without strokes")?;

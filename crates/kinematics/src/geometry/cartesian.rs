@@ -27,6 +27,16 @@ impl Cartesian {
         (Joints::new(first.x, first.y), Joints::new(second.x, second.y))
     }
 
+    pub(super) fn path_third_derivative(
+        self,
+        _q: &Joints,
+        _first: Vec2,
+        _second: Vec2,
+        third: Vec2,
+    ) -> Joints {
+        Joints::new(third.x, third.y)
+    }
+
     pub(super) fn bend(self, _from: &Joints, _to: &Joints) -> f64 {
         0.0
     }

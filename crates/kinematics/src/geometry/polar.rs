@@ -11,6 +11,8 @@ use super::{Joints, Unreachable, frame};
 /// J   = [ r t   e ]                 det J = -r
 /// phi' = (v.t) / r                  r' = v.e
 /// phi'' = (a.t - 2 r' phi') / r     r'' = a.e + r phi'^2
+/// phi''' = (j.t - phi' a.e - 3 r' phi'' - 2 r'' phi') / r
+/// r''' = j.e + phi' a.t + r' phi'^2 + 2 r phi' phi''
 /// ```
 /// Singular at the centre. Source: differentiating the definition; seed 4 (drawing robot with rack and pinion).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,6 +40,15 @@ impl Polar {
         let phi_2 = (second.dot(t) - 2.0 * r_1 * phi_1) / r;
         let r_2 = second.dot(e) + r * phi_1 * phi_1;
         (Joints::new(phi_1, r_1), Joints::new(phi_2, r_2))
+    }
+
+    pub(super) fn path_third_derivative(self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Joints {
+        let ((e, t), r) = (frame(q.x), q.y);
+        let (rates, turns) = self.path_derivatives(q, first, second);
+        let ((phi_1, r_1), (phi_2, r_2)) = ((rates.x, rates.y), (turns.x, turns.y));
+        let phi_3 = (third.dot(t) - phi_1 * second.dot(e) - 3.0 * r_1 * phi_2 - 2.0 * r_2 * phi_1) / r;
+        let r_3 = third.dot(e) + phi_1 * second.dot(t) + r_1 * phi_1 * phi_1 + 2.0 * r * phi_1 * phi_2;
+        Joints::new(phi_3, r_3)
     }
 
     /// d²p/du² = 2 r' phi' t - r phi'^2 e, largest where r is.

@@ -21,9 +21,12 @@ use super::{Joints, Unreachable, frame};
 /// psi'   = -v.e(theta) / (L2 sin beta)
 /// theta'' =  (a.e(psi)   + L1 theta'^2 cos beta + L2 psi'^2) / (L1 sin beta)
 /// psi''   = -(a.e(theta) + L1 theta'^2 + L2 psi'^2 cos beta) / (L2 sin beta)
+/// with u = 3 L1 theta' theta'' and w = 3 L2 psi' psi'':
+/// theta''' =  (j.e(psi)   + u cos beta + w) / (L1 sin beta) + theta'^3
+/// psi'''   = -(j.e(theta) + u + w cos beta) / (L2 sin beta) + psi'^3
 /// ```
 /// The elbow on the left of the line from base to pen means beta < 0. Singular when stretched or folded (beta = 0 or
-/// pi). Source: seed 1's report for the position; the derivatives by differentiating `p` twice and solving for the
+/// pi). Source: seed 1's report for the position; the derivatives by differentiating `p` and solving for the
 /// joints (the tests hold them against differences).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoLink {
@@ -75,6 +78,18 @@ impl TwoLink {
         let theta_2 = (second.dot(e2) + w1 * cos + w2) / (l1 * sin);
         let psi_2 = -(second.dot(e1) + w1 + w2 * cos) / (l2 * sin);
         (Joints::new(theta_1, psi_1), Joints::new(theta_2, psi_2))
+    }
+
+    pub(super) fn path_third_derivative(self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Joints {
+        let Self { l1, l2, .. } = self;
+        let ((e1, t1), (e2, _)) = (frame(q.x), frame(q.y));
+        let (sin, cos) = (t1.dot(e2), e1.dot(e2));
+        let (rates, turns) = self.path_derivatives(q, first, second);
+        let (u, w) = (3.0 * l1 * rates.x * turns.x, 3.0 * l2 * rates.y * turns.y);
+        let cube = |rate: f64| rate * rate * rate;
+        let theta_3 = (third.dot(e2) + u * cos + w) / (l1 * sin) + cube(rates.x);
+        let psi_3 = -(third.dot(e1) + u + w * cos) / (l2 * sin) + cube(rates.y);
+        Joints::new(theta_3, psi_3)
     }
 
     /// d²p/du² = -L1 theta'^2 e(theta) - L2 psi'^2 e(psi), whatever the coupling.

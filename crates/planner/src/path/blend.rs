@@ -1,4 +1,4 @@
-//! Corners as parabolas.
+//! Corners as parabolas, or as splines where jerk is limited.
 //!
 //! At a corner the direction changes from the unit vector `u` to `v`. A parabola (quadratic Bézier curve) with legs of
 //! the length `l` on both sides of the vertex P joins them tangentially:
@@ -15,15 +15,37 @@
 //! `c² = 8 d a / |v - u|²`. A circular arc of the same deviation allows `a d / (1 / cos(theta/2) - 1)`: the same for
 //! small turns, 1.66 times less at a right angle. The vertex is missed by d and the blend strays by less.
 
-use drawing::{CubicBez, Point, Segment};
+//! Where a motor's jerk is limited the curvature must not jump either. There a uniform cubic B-spline of three spans joins the
+//! two sides with their position, direction and curvature. Between lines, with spans of h, it has legs of `1.5 h`:
+//!
+//! ```text
+//! control points  P - 5/2 h u,  P - 3/2 h u,  P - 1/2 h u,  P + 1/2 h v,  P + 3/2 h v,  P + 5/2 h v
+//! nearest to P    d = 13 h |v - u| / 48,   |p''| <= |v - u| / (2 h),   |p'''| = |v - u| / (2 h²)      by a parameter of |p'| = 1
+//! ```
+//! Its legs are 1.4 times those of the parabola that misses the vertex by as much. Also where a line runs smoothly into an arc
+//! the curvature jumps; such joints become splines too.
+
+use drawing::{CubicBez, Point, Segment, Vec2};
 
 use super::{direction_at, distance, is_smooth};
 
 /// Directions that differ by more than this (cosine) turn back: 175 degrees.
 const TURNS_BACK: f64 = -0.9962;
 
+/// Curvatures that differ by less than this share go on.
+const SAME_CURVATURE: f64 = 1e-9;
+
 /// Blends shorter than this are not worth a piece, mm.
 const SHORTEST: f64 = 1e-6;
+
+/// What becomes of a corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Corner {
+    /// A parabola: the curvature jumps at its ends. The fastest where only acceleration is limited.
+    Parabola,
+    /// A spline of three cubics: the curvature is continuous.
+    Spline,
+}
 
 /// The joint after each piece but the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +60,11 @@ enum Joint {
 
 /// Smooth runs of curves: corners blended within `deviation` mm, cut where the pen turns back (or at every corner if
 /// the deviation is 0).
-pub(super) fn sections(pieces: &[Segment], deviation: f64) -> Vec<Vec<Segment>> {
+pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Vec<Segment>> {
     if pieces.is_empty() {
         return Vec::new();
     }
-    let joints = joints(pieces, deviation);
+    let joints = joints(pieces, deviation, corner);
     let mut sections = Vec::new();
     let mut section = Vec::new();
     // How much of the piece at hand its first blend has taken, mm.
@@ -57,7 +79,7 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64) -> Vec<Vec<Segment>> 
             Joint::Smooth => {}
             Joint::Stop => sections.push(std::mem::take(&mut section)),
             Joint::Blend(leg) => {
-                section.extend(parabola(piece, &pieces[index + 1], leg));
+                section.extend(corner.curve(piece, &pieces[index + 1], leg).into_iter().flatten());
                 taken = leg;
             }
         }
@@ -66,9 +88,9 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64) -> Vec<Vec<Segment>> 
 }
 
 /// Every joint, with legs such that neighbouring blends share the piece between them.
-fn joints(pieces: &[Segment], deviation: f64) -> Vec<Joint> {
+fn joints(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Joint> {
     let mut joints: Vec<Joint> =
-        pieces.windows(2).map(|pair| wanted(&pair[0], &pair[1], deviation)).collect();
+        pieces.windows(2).map(|pair| wanted(&pair[0], &pair[1], deviation, corner)).collect();
     // The piece between two blends: whoever wants less than half of it leaves the rest to the other.
     let leg = |joint: Option<&Joint>| match joint {
         Some(Joint::Blend(leg)) => *leg,
@@ -96,24 +118,31 @@ fn joints(pieces: &[Segment], deviation: f64) -> Vec<Joint> {
 }
 
 /// What a joint would be if it had both pieces to itself.
-fn wanted(before: &Segment, after: &Segment, deviation: f64) -> Joint {
+fn wanted(before: &Segment, after: &Segment, deviation: f64, corner: Corner) -> Joint {
     let (Some(u), Some(v)) = (direction_at(before, 1.0), direction_at(after, 0.0)) else {
         return Joint::Stop;
     };
-    if is_smooth(u, v) {
+    if is_smooth(u, v) && (corner == Corner::Parabola || is_as_curved(before, after)) {
         return Joint::Smooth;
     }
     if deviation <= 0.0 || u.dot(v) < TURNS_BACK {
         return Joint::Stop;
     }
-    let leg = 4.0 * deviation / (v - u).hypot2().sqrt();
+    let share = match corner {
+        Corner::Parabola => 4.0,
+        Corner::Spline => 72.0 / 13.0,
+    };
+    let leg = share * deviation / (v - u).hypot2().sqrt();
     if matches!((before, after), (Segment::Line(_), Segment::Line(_))) {
         return Joint::Blend(leg);
     }
     // Between curves the closed form is only where to begin: shorten until what is measured holds.
     let mut leg = leg.min(available(before) / 2.0).min(available(after) / 2.0);
     while leg > SHORTEST {
-        if parabola(before, after, leg).is_some_and(|blend| strays(&blend, before, after, leg) <= deviation) {
+        if corner
+            .curve(before, after, leg)
+            .is_some_and(|blend| strays(&blend, before, after, leg) <= deviation)
+        {
             return Joint::Blend(leg);
         }
         leg *= 0.7;
@@ -153,10 +182,19 @@ fn parameter(piece: &Segment, leg: f64, at_start: bool) -> f64 {
     if at_start { share } else { 1.0 - share }
 }
 
-/// The blend at the joint of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
-/// Nothing if those do not meet between.
-fn parabola(before: &Segment, after: &Segment, leg: f64) -> Option<Segment> {
-    let (t0, t1) = (parameter(before, leg, false), parameter(after, leg, true));
+impl Corner {
+    /// The blend at the joint of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
+    /// Nothing if there is none between.
+    fn curve(self, before: &Segment, after: &Segment, leg: f64) -> Option<Vec<Segment>> {
+        let (t0, t1) = (parameter(before, leg, false), parameter(after, leg, true));
+        match self {
+            Self::Parabola => Some(vec![parabola(before, t0, after, t1, leg)?]),
+            Self::Spline => spline(before, t0, after, t1, leg),
+        }
+    }
+}
+
+fn parabola(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Option<Segment> {
     let (start, end) = (before.eval(t0), after.eval(t1));
     let (u, v) = (direction_at(before, t0)?, direction_at(after, t1)?);
     // start + x u = end - y v
@@ -172,15 +210,54 @@ fn parabola(before: &Segment, after: &Segment, leg: f64) -> Option<Segment> {
     Some(Segment::Cubic(CubicBez::new(start, third(start), third(end), end)))
 }
 
+/// The spline whose control points give position p, direction and curvature at both ends: from `p = (c0 + 4 c1 + c2) / 6`,
+/// `h p' = (c2 - c0) / 2` and `h² p'' = c0 - 2 c1 + c2`.
+fn spline(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Option<Vec<Segment>> {
+    let h = leg / 1.5;
+    let (u, v) = (direction_at(before, t0)?, direction_at(after, t1)?);
+    let (bend0, bend1) = (0.5 * h * h * curvature_at(before, t0), 0.5 * h * h * curvature_at(after, t1));
+    let c1 = before.eval(t0) - bend0 / 3.0;
+    let c4 = after.eval(t1) - bend1 / 3.0;
+    let (c0, c2) = (c1 + bend0 - h * u, c1 + bend0 + h * u);
+    let (c3, c5) = (c4 + bend1 - h * v, c4 + bend1 + h * v);
+    let span = |[a, b, c, d]: [Point; 4]| {
+        let mean = |x: Point, y: Point, z: Point| {
+            Point::ORIGIN + (x.to_vec2() + 4.0 * y.to_vec2() + z.to_vec2()) / 6.0
+        };
+        let curve = CubicBez::new(mean(a, b, c), b.lerp(c, 1.0 / 3.0), b.lerp(c, 2.0 / 3.0), mean(b, c, d));
+        Segment::Cubic(curve)
+    };
+    let spans = [[c0, c1, c2, c3], [c1, c2, c3, c4], [c2, c3, c4, c5]].map(span);
+    // Two ends that are turned too far against each other would make a loop.
+    let forward = |segment: &Segment| {
+        let (first, _) = segment.derivatives(0.5);
+        first.dot(u + v) > 0.0
+    };
+    spans.iter().all(forward).then(|| spans.to_vec())
+}
+
+/// The second derivative by a parameter of which the pen's speed is 1 there, 1/mm: where the parameter is the length, the
+/// curvature towards its centre.
+fn curvature_at(piece: &Segment, t: f64) -> Vec2 {
+    let (first, second) = piece.derivatives(t);
+    second / first.hypot2()
+}
+
+/// Whether the curvature goes on at a smooth joint.
+fn is_as_curved(before: &Segment, after: &Segment) -> bool {
+    let (one, other) = (curvature_at(before, 1.0), curvature_at(after, 0.0));
+    (one - other).hypot2().sqrt() <= SAME_CURVATURE * (one.hypot2().sqrt() + other.hypot2().sqrt())
+}
+
 /// How far a blend strays from the two pieces, or misses their joint, mm, by samples; a bound to a few per cent.
-fn strays(blend: &Segment, before: &Segment, after: &Segment, leg: f64) -> f64 {
+fn strays(blend: &[Segment], before: &Segment, after: &Segment, leg: f64) -> f64 {
     const SAMPLES: u32 = 16;
     let along = |segment: &Segment, from: f64, to: f64| -> Vec<Point> {
         (0..=SAMPLES).map(|k| segment.eval(from + (to - from) * f64::from(k) / f64::from(SAMPLES))).collect()
     };
     let mut corner = along(before, parameter(before, leg, false), 1.0);
     corner.extend(along(after, 0.0, parameter(after, leg, true)));
-    let path = along(blend, 0.0, 1.0);
+    let path: Vec<Point> = blend.iter().flat_map(|segment| along(segment, 0.0, 1.0)).collect();
     let off = |from: &[Point], to: &[Point]| {
         let nearest =
             |p: &Point| to.windows(2).map(|w| to_chord(*p, w[0], w[1])).fold(f64::INFINITY, f64::min);
@@ -210,6 +287,7 @@ mod tests {
         #[test]
         fn blends_stay_within_the_deviation_both_ways_and_are_smooth(
             turns in proptest::collection::vec((-3.0..3.0f64, 0.02..5.0f64), 2..12), deviation in 0.01..0.5f64,
+            corner in prop_oneof![Just(Corner::Parabola), Just(Corner::Spline)],
         ) {
             let (mut at, mut angle) = (Point::ZERO, 0.0);
             let mut points = vec![at];
@@ -219,13 +297,17 @@ mod tests {
                 points.push(at);
             }
             let lines: Vec<Segment> = points.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
-            let sections = sections(&lines, deviation);
+            let sections = sections(&lines, deviation, corner);
             let mut path = Vec::new();
             for section in &sections {
                 for pair in section.windows(2) {
                     let (a, b) = (direction_at(&pair[0], 1.0).unwrap(), direction_at(&pair[1], 0.0).unwrap());
                     prop_assert!((pair[0].end() - pair[1].start()).hypot2() < 1e-10);
                     prop_assert!(a.dot(b) > 1.0 - 1e-9);
+                    if corner == Corner::Spline {
+                        let jump = curvature_at(&pair[0], 1.0) - curvature_at(&pair[1], 0.0);
+                        prop_assert!(jump.hypot2().sqrt() < 1e-6, "curvature jumps by {:?}", jump);
+                    }
                 }
                 path.extend(section.iter().flat_map(|piece| (0..=32).map(|k| piece.eval(f64::from(k) / 32.0))));
             }
@@ -245,7 +327,7 @@ mod tests {
         let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, -1.0, 2.0));
         let Segment::Arc(at) = arc else { unreachable!("it is an arc") };
         let to = Segment::Line(Line::new(line.end(), at.eval(0.0)));
-        let sections = sections(&[line, to, arc], 0.05);
+        let sections = sections(&[line, to, arc], 0.05, Corner::Parabola);
         assert_eq!(sections.len(), 1);
         for pair in sections[0].windows(2) {
             let (a, b) = (direction_at(&pair[0], 1.0).unwrap(), direction_at(&pair[1], 0.0).unwrap());
@@ -257,9 +339,33 @@ mod tests {
     fn a_right_angle_uses_all_of_its_deviation() {
         let corner = [Point::new(0.0, 0.0), Point::new(10.0, 0.0), Point::new(10.0, 10.0)];
         let lines: Vec<Segment> = corner.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
-        let sections = sections(&lines, 0.1);
+        let sections = sections(&lines, 0.1, Corner::Parabola);
         assert_eq!(sections.len(), 1);
         let nearest = sections[0][1].eval(0.5);
         assert!((distance(nearest, corner[1]) - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_spline_uses_all_of_its_deviation_too() {
+        let corner = [Point::new(0.0, 0.0), Point::new(10.0, 0.0), Point::new(10.0, 10.0)];
+        let lines: Vec<Segment> = corner.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
+        let sections = sections(&lines, 0.1, Corner::Spline);
+        assert_eq!((sections.len(), sections[0].len()), (1, 5));
+        let nearest = sections[0][2].eval(0.5);
+        assert!((distance(nearest, corner[1]) - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_line_that_runs_into_a_circle_gets_a_transition() {
+        let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(10.0, 0.0)));
+        let down = -std::f64::consts::FRAC_PI_2;
+        let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, down, 2.0));
+        assert_eq!(sections(&[line, arc], 0.05, Corner::Parabola)[0].len(), 2);
+        let splined = sections(&[line, arc], 0.05, Corner::Spline);
+        assert_eq!((splined.len(), splined[0].len()), (1, 5));
+        for pair in splined[0].windows(2) {
+            let jump = curvature_at(&pair[0], 1.0) - curvature_at(&pair[1], 0.0);
+            assert!(jump.hypot2().sqrt() < 1e-9 && distance(pair[0].end(), pair[1].start()) < 1e-9);
+        }
     }
 }

@@ -12,6 +12,8 @@ mod zones;
 
 use drawing::{Line, Point, Segment, Stroke, Vec2};
 
+pub use blend::Corner;
+
 /// Vertices that lie on the straight line between their neighbours, to this distance in mm, are not corners.
 const COLLINEAR: f64 = 1e-9;
 
@@ -31,6 +33,8 @@ pub struct Budget {
     pub simplify: f64,
     /// Blends that stand for corners.
     pub blend: f64,
+    /// What becomes of corners.
+    pub corner: Corner,
     /// What linear motion between rows may take, where the motors are strong enough to exceed it: then pieces near turns
     /// are marked. Infinite where they are not.
     pub row: f64,
@@ -65,7 +69,7 @@ pub type Section = Vec<Piece>;
 pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
     let pieces = clean(stroke, budget.chord);
     let pieces = if budget.simplify > 0.0 { simplify::simplify(pieces, budget.simplify) } else { pieces };
-    let sections = blend::sections(&pieces, budget.blend).into_iter().map(parametrise);
+    let sections = blend::sections(&pieces, budget.blend, budget.corner).into_iter().map(parametrise);
     sections
         .map(|section| if budget.row.is_finite() { zones::mark(section, budget.row) } else { section })
         .collect()
@@ -163,7 +167,8 @@ mod tests {
 
     use super::*;
 
-    const EXACT: Budget = Budget { chord: 0.01, simplify: 0.0, blend: 0.0, row: f64::INFINITY };
+    const EXACT: Budget =
+        Budget { chord: 0.01, simplify: 0.0, blend: 0.0, corner: Corner::Parabola, row: f64::INFINITY };
 
     fn polyline(points: &[(f64, f64)]) -> Stroke {
         let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();

@@ -58,7 +58,9 @@ fn turning(piece: &Piece) -> Option<f64> {
     }
     let (_, start) = piece.curve.derivatives(0.0);
     let (_, end) = piece.curve.derivatives(1.0);
-    let second = piece.rate * piece.rate * start.hypot2().min(end.hypot2()).sqrt();
+    // Where the curvature rises from nothing, as on a spline, the pen is slowed down by what comes next.
+    let (least, most) = (start.hypot2().min(end.hypot2()).sqrt(), start.hypot2().max(end.hypot2()).sqrt());
+    let second = piece.rate * piece.rate * least.max(0.25 * most);
     Some(second.max(1e-6))
 }
 

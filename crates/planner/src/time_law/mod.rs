@@ -1,8 +1,9 @@
-//! Time-optimal speed along a joint path under every motor's speed and acceleration, from rest to rest.
+//! Time-optimal speed along a joint path under every motor's speed, acceleration and jerk, from rest to rest.
 
 mod acceleration;
 mod bounds;
 mod eased;
+mod jerk;
 
 use kinematics::Machine;
 
@@ -92,6 +93,8 @@ pub struct Limiting {
     pub acceleration: [f64; 2],
     /// Each motor's acceleration, while most of it is needed to turn: in corners and curves.
     pub turning: [f64; 2],
+    /// Each motor's jerk.
+    pub jerk: [f64; 2],
     /// The pen's speed.
     pub pen: f64,
     /// Rows: between them motors move linearly, and more speed would cut a turn by too much.
@@ -101,6 +104,22 @@ pub struct Limiting {
 impl Profile {
     fn new() -> Self {
         Self { phases: Vec::new(), duration: 0.0, limiting: Limiting::default() }
+    }
+
+    /// The same motion in so many times the time.
+    fn slowed(mut self, times: f64) -> Self {
+        let slower = 1.0 / times;
+        for phase in &mut self.phases {
+            phase.speed *= slower;
+            phase.acceleration *= slower * slower;
+            phase.growth *= slower * slower;
+            phase.jerk *= slower * slower * slower;
+            phase.duration *= times;
+        }
+        self.duration *= times;
+        let limiting = std::mem::take(&mut self.limiting);
+        self.limiting.add(&limiting, times);
+        self
     }
 
     fn push(&mut self, phase: Phase) {
@@ -113,7 +132,7 @@ impl Limiting {
     /// All of it together, s.
     pub fn total(&self) -> f64 {
         let of = |pair: [f64; 2]| pair[0] + pair[1];
-        of(self.speed) + of(self.acceleration) + of(self.turning) + self.pen + self.rows
+        of(self.speed) + of(self.acceleration) + of(self.turning) + of(self.jerk) + self.pen + self.rows
     }
 
     /// Adds what limited another motion, `scale` times as long.
@@ -122,6 +141,7 @@ impl Limiting {
             self.speed[k] += scale * other.speed[k];
             self.acceleration[k] += scale * other.acceleration[k];
             self.turning[k] += scale * other.turning[k];
+            self.jerk[k] += scale * other.jerk[k];
         }
         self.pen += scale * other.pen;
         self.rows += scale * other.rows;
@@ -132,7 +152,11 @@ pub use eased::{Ease, eased};
 
 /// The fastest profile along `path` under the machine's motors and the cap.
 pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    acceleration::profile(machine, path, cap)
+    if jerk::applies(machine) {
+        jerk::profile(machine, path, cap)
+    } else {
+        acceleration::profile(machine, path, cap)
+    }
 }
 
 /// The same with no more cells than the path has: ten times as fast to find, and within a few per cent of the best.

@@ -67,3 +67,13 @@ pub(crate) fn polar() -> Machine {
         Joints::new(FRAC_PI_2, 138.0),
     )
 }
+
+/// The machine with motors that need so many s to build up their largest acceleration.
+#[allow(dead_code, reason = "not every test that shares this module needs it")]
+pub(crate) fn with_jerk(machine: &Machine, build_up: f64) -> Machine {
+    let mut parts = machine.parts().clone();
+    for motor in &mut parts.motors {
+        motor.max_jerk = Some(motor.max_acceleration / build_up);
+    }
+    Machine::new(parts).expect("a machine with another limit is one")
+}

@@ -1,0 +1,760 @@
+//! Speed under motor speeds, accelerations and jerks: reachable sets in the plane of b and db/ds.
+//!
+//! With `b = (ds/dt)²`, `c = db/ds` and `w = d²b/ds²` a motor with position m(s) has
+//!
+//! ```text
+//! acceleration  |½ m' c + m'' b|                          <= a
+//! jerk          |½ m' w + 3/2 m'' c + m''' b|  √b         <= j
+//! ```
+//! `w` is constant on a cell, so b is a parabola and the motion `d²s/dt² = c/2 + w s/2`. Divided by √b the right side of the
+//! second, `j / √b`, is convex in b: its tangent at any b* lies below it, so with `j (3/2 - b / (2 b*)) / √b*` in its place
+//! the condition is linear and no less strict (the step by which sequential programs stay feasible: Debrouwere et al.
+//! 2013, Lee et al. 2024, arXiv 2404.07889). All conditions on (b, c, w) at a cell's start, middle and end are then
+//! half-spaces, and the set of (b, c) at a node from which the end can be reached is a convex polygon: the one of the
+//! next node, carried back through the cell, with w projected out (every upper bound of w against every lower one). Forward,
+//! the largest w at each node that stays within the next polygon. Twice more with b* at the speeds found.
+//!
+//! At rest `b` rises as `s^(4/3)`, faster than any parabola: the first cell of a path has an even jerk in time, which leads to
+//! a point on the ray `c = 4 b / (3 length)`, and the last one likewise.
+//!
+//! Between the places that were looked at a limit may be exceeded a little. It is looked for in more places, and the motion
+//! made slower by as much; so is all of it where no way was found.
+
+use drawing::Segment;
+use kinematics::{Joints, Machine};
+use nalgebra::Vector2;
+
+use super::{Phase, Profile, SpeedCap, acceleration};
+use crate::lift::{Course, JointPath};
+use crate::path::Piece;
+
+/// How often b* is put where the speeds are.
+const PASSES: usize = 4;
+
+/// Passes end that bring no more than this share of the time.
+const LEAST_GAIN: f64 = 1e-3;
+
+/// A motion that would have to be slowed down by more than this between the places that were looked at is planned anew with
+/// stricter limits where that is so.
+const EXCESS: f64 = 1.002;
+
+/// Corners of a polygon at most; beyond that those go that cost least.
+const CORNERS: usize = 24;
+
+/// Whether any motor's jerk is limited.
+pub(super) fn applies(machine: &Machine) -> bool {
+    machine.motors().iter().any(|motor| motor.max_jerk.is_some())
+}
+
+/// The law on a path.
+pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
+    match &path.course {
+        Course::Travel(..) => straight(machine, path.cells[0].first[0]),
+        Course::Drawn(_, section) => {
+            let fastest = acceleration::profile(machine, path, cap);
+            let mut cells = cells(machine, path, section, cap, &fastest);
+            let mut best: Option<Profile> = None;
+            for _ in 0..PASSES {
+                let Some(states) = solve(&cells) else { break };
+                let (found, excess) = emit(machine, section, &cells, &states);
+                if !found.duration.is_finite() {
+                    break;
+                }
+                let gain = best.as_ref().map_or(f64::INFINITY, |best| 1.0 - found.duration / best.duration);
+                if gain > 0.0 {
+                    best = Some(found);
+                }
+                if gain < LEAST_GAIN && excess.iter().all(|excess| *excess == (1.0, 1.0)) {
+                    break;
+                }
+                for ((cell, state), excess) in cells.iter_mut().zip(states.windows(2)).zip(excess) {
+                    cell.aim(state[0], state[1]);
+                    cell.tighten(excess);
+                }
+            }
+            best.unwrap_or_else(|| slowed_until_smooth(machine, fastest, cap))
+        }
+    }
+}
+
+/// What a motor allows at one place of a path.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Derivatives by s over the motors' limits: m' / v; m' / a, m'' / a; m' / j, m'' / j, m''' / j.
+    speed: [f64; 2],
+    acceleration: [[f64; 2]; 2],
+    jerk: [[f64; 3]; 2],
+    pen_speed: f64,
+    bend: f64,
+}
+
+impl Place {
+    fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
+        let t = (s * piece.rate).clamp(0.0, 1.0);
+        let rate = piece.rate;
+        let (first, second) = piece.curve.derivatives(t);
+        let (first, second) = (rate * first, rate * rate * second);
+        let third = rate * rate * rate * piece.curve.third_derivative(t);
+        let pose: Joints = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
+        let (m1, m2) = machine.motor_derivatives(&pose, first, second);
+        let m3 = machine.motor_third_derivative(&pose, first, second, third);
+        let (rates, _) = machine.geometry().path_derivatives(&pose, first, second);
+        let bending = if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { second.hypot2().sqrt() };
+        let motors = machine.motors();
+        let of = |k: usize, m: &Vector2<f64>, limit: f64| m[k] / limit;
+        let jerk = |k: usize| motors[k].max_jerk.unwrap_or(f64::INFINITY);
+        Some(Self {
+            speed: [0, 1].map(|k| of(k, &m1, motors[k].max_speed)),
+            acceleration: [0, 1].map(|k| [&m1, &m2].map(|m| of(k, m, motors[k].max_acceleration))),
+            jerk: [0, 1].map(|k| [&m1, &m2, &m3].map(|m| of(k, m, jerk(k)))),
+            pen_speed: first.hypot2().sqrt(),
+            bend: bending + machine.geometry().bend(&pose, &(pose + rates)),
+        })
+    }
+
+    /// The largest b by speeds and rows.
+    fn cap(&self, cap: &SpeedCap) -> f64 {
+        let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
+        let speed = (cap.pen / self.pen_speed).min(1.0 / self.speed[0].abs()).min(1.0 / self.speed[1].abs());
+        (speed * speed).min(rows / self.bend)
+    }
+
+    /// Largest shares of the limits on acceleration and jerk.
+    fn shares(&self, state: State, w: f64) -> (f64, f64) {
+        let [b, c] = state;
+        let acceleration = |[m1, m2]: [f64; 2]| (0.5 * m1 * c + m2 * b).abs();
+        let jerk = |[m1, m2, m3]: [f64; 3]| (0.5 * m1 * w + 1.5 * m2 * c + m3 * b).abs() * b.max(0.0).sqrt();
+        let most = |f: &dyn Fn(usize) -> f64| f(0).max(f(1));
+        (most(&|k| acceleration(self.acceleration[k])), most(&|k| jerk(self.jerk[k])))
+    }
+}
+
+/// b and c.
+type State = [f64; 2];
+
+/// A stretch of a path with one w.
+#[derive(Clone, Debug)]
+struct Cell {
+    piece: usize,
+    start: f64,
+    length: f64,
+    /// At its start, middle and end.
+    places: [Place; 3],
+    cap: f64,
+    /// On turns and near them the pen's |p'| |u| + bend b may be no more than this; otherwise infinite.
+    row_limit: f64,
+    /// b* at its start, middle and end.
+    aim: [f64; 3],
+    /// Shares of the limits on acceleration and jerk that are used.
+    allowed: (f64, f64),
+    /// A b that its start can well be passed with, see [`floors`].
+    floor: f64,
+}
+
+const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
+
+impl Cell {
+    /// b and c at a share of it.
+    fn state(&self, from: State, w: f64, share: f64) -> State {
+        let s = share * self.length;
+        [from[0] + s * (from[1] + 0.5 * s * w), from[1] + s * w]
+    }
+
+    /// Puts b* where the speed is now.
+    fn aim(&mut self, from: State, to: State) {
+        let w = (to[1] - from[1]) / self.length;
+        let speeds = SHARES.map(|share| self.state(from, w, share)[0]);
+        for (aim, b) in self.aim.iter_mut().zip(speeds) {
+            *aim = b.max(1e-3 * *aim);
+        }
+    }
+
+    fn tighten(&mut self, excess: (f64, f64)) {
+        let stricter = |allowed: f64, excess: f64| {
+            if excess > 1.0 { (allowed / excess).max(0.5 * allowed) } else { allowed }
+        };
+        self.allowed = (stricter(self.allowed.0, excess.0), stricter(self.allowed.1, excess.1));
+    }
+
+    /// All conditions on (b, c) at its start and w: `x b + y c + z w <= room`.
+    fn conditions(&self) -> Vec<[f64; 4]> {
+        let mut all = Vec::with_capacity(40);
+        for (j, share) in SHARES.into_iter().enumerate() {
+            let (place, s) = (&self.places[j], share * self.length);
+            // b there is b + s c + s²/2 w, c there is c + s w.
+            let mut hold = |of_b: f64, of_c: f64, of_w: f64, room: f64| {
+                all.push([of_b, of_b * s + of_c, 0.5 * of_b * s * s + of_c * s + of_w, room]);
+            };
+            hold(1.0, 0.0, 0.0, self.cap);
+            hold(-1.0, 0.0, 0.0, 0.0);
+            let tangent = (1.5 / self.aim[j].sqrt(), -0.5 / (self.aim[j] * self.aim[j].sqrt()));
+            for k in 0..2 {
+                for sign in [1.0, -1.0] {
+                    let [m1, m2] = place.acceleration[k].map(|m| sign * m);
+                    hold(m2, 0.5 * m1, 0.0, self.allowed.0);
+                    if place.jerk[k] != [0.0; 3] {
+                        let [m1, m2, m3] = place.jerk[k].map(|m| sign * m);
+                        let (room, slope) = (self.allowed.1 * tangent.0, self.allowed.1 * tangent.1);
+                        hold(m3 - slope, 1.5 * m2, 0.5 * m1, room);
+                    }
+                }
+            }
+            if self.row_limit.is_finite() {
+                for sign in [1.0, -1.0] {
+                    hold(place.bend, 0.5 * sign * place.pen_speed, 0.0, self.row_limit);
+                }
+            }
+        }
+        all
+    }
+
+    /// The largest b that an even jerk in time from rest may lead to at the other end of the cell: all limits grow with
+    /// b there, so their worst over the cell is at that end.
+    fn most_from_rest(&self) -> f64 {
+        let h = self.length;
+        // With b there: c = 4 b / (3 h), u = c / 2, and the jerk of s is √b³ / (rest of this) by s = j t³/6.
+        let jerk = JERK_OF_REST / (h * h);
+        let mut most = self.cap;
+        for place in &self.places {
+            for k in 0..2 {
+                let [m1, m2] = place.acceleration[k].map(f64::abs);
+                most = most.min(self.allowed.0 / (m1 * 2.0 / (3.0 * h) + m2));
+                let [m1, m2, m3] = place.jerk[k].map(f64::abs);
+                let by = self.allowed.1 / (m1 * jerk + 2.0 * m2 / h + m3);
+                most = most.min(libm::cbrt(by * by));
+            }
+            if self.row_limit.is_finite() {
+                most = most.min(self.row_limit / (place.pen_speed * 2.0 / (3.0 * h) + place.bend));
+            }
+        }
+        most
+    }
+}
+
+/// `j h² / √b³` for a motion with the jerk j from rest to b at h: with `h = j t³/6` and `b = j² t⁴/4` it is
+/// `(t⁶ j³ / 36) (8 / (j³ t⁶)) = 2/9`.
+const JERK_OF_REST: f64 = 2.0 / 9.0;
+
+/// c over b at the end of a cell that begins at rest.
+fn ray(length: f64) -> f64 {
+    4.0 / (3.0 * length)
+}
+
+/// The path in cells short enough for one w each: by time, a fifth of what a motor needs to build up its acceleration, and
+/// ever shorter towards rest.
+fn cells(
+    machine: &Machine,
+    path: &JointPath,
+    section: &[Piece],
+    cap: &SpeedCap,
+    fastest: &Profile,
+) -> Vec<Cell> {
+    let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
+    let build_up =
+        machine.motors().iter().filter_map(|motor| motor.max_jerk.map(|jerk| motor.max_acceleration / jerk));
+    let build_up = build_up.fold(0.0, f64::max);
+    let total: f64 = path.cells.iter().map(|cell| cell.length).sum();
+    let mut speeds = Speeds { phases: &fastest.phases, at: 0 };
+    let mut cells = Vec::new();
+    let mut done = 0.0;
+    for cell in &path.cells {
+        let piece = &section[cell.piece];
+        let acceleration = machine
+            .motors()
+            .iter()
+            .enumerate()
+            .map(|(k, motor)| motor.max_acceleration / cell.first[1][k].abs());
+        let ramp = 0.02 * acceleration.fold(f64::INFINITY, f64::min) * build_up * build_up;
+        let longest = cell.length / if matches!(piece.curve, Segment::Line(_)) { 1.0 } else { 2.0 };
+        let mut at = 0.0;
+        // Not to the last bit: a rounding error is no cell.
+        while cell.length - at > 1e-9 * cell.length {
+            let s = done + at;
+            let to_rest = s.min(total - s);
+            let speed = speeds.square(cell.piece, cell.start + at).sqrt();
+            let wanted = (0.2 * speed * build_up)
+                .max(ramp)
+                .min(0.25 * (to_rest + 4.0 * ramp))
+                .min(0.1 * total)
+                .min(longest);
+            // The last steps towards rest as short as the first away from it.
+            let wanted = wanted.min(0.25 * (total - s).max(0.0) + ramp).max(1e-6 * total);
+            let left = cell.length - at;
+            let length = if left < 1.5 * wanted { left } else { wanted };
+            let start = cell.start + at;
+            let place = |share: f64| Place::at(machine, piece, start + share * length);
+            if let (Some(a), Some(m), Some(b)) = (place(0.0), place(0.5), place(1.0)) {
+                let places = [a, m, b];
+                let top = places.iter().map(|place| place.cap(cap)).fold(f64::INFINITY, f64::min);
+                let row_limit = if cell.near_turn { rows } else { f64::INFINITY };
+                let aim = SHARES.map(|share| {
+                    let s = s + share * length;
+                    let b = speeds.square(cell.piece, start + share * length).min(top);
+                    let rest = s.min(total - s).max(0.1 * length);
+                    places[1].aim(b, rest)
+                });
+                cells.push(Cell {
+                    piece: cell.piece,
+                    start,
+                    length,
+                    places,
+                    cap: top,
+                    row_limit,
+                    aim,
+                    allowed: (1.0, 1.0),
+                    floor: 0.0,
+                });
+            }
+            at += length;
+        }
+        done += cell.length;
+    }
+    floors(&mut cells);
+    cells
+}
+
+/// Finds speeds with which the path can be followed gently: no turn needs more than its share, and speeding up and slowing
+/// down need no more acceleration than can be given up again while the speed changes by a half.
+///
+/// Going as fast as possible from the start would brake for a turn so late that the pen nearly stands when the brake is
+/// released. Speeds below a share of these are therefore not taken.
+fn floors(cells: &mut [Cell]) {
+    let total: f64 = cells.iter().map(|cell| cell.length).sum();
+    let mut at = 0.0_f64;
+    for cell in cells.iter_mut() {
+        let most = |of: &dyn Fn(&Place) -> f64| cell.places.iter().map(of).fold(0.0, f64::max);
+        let turn = most(&|place| place.jerk[0][2].abs().max(place.jerk[1][2].abs()));
+        let bend = most(&|place| place.acceleration[0][1].abs().max(place.acceleration[1][1].abs()));
+        let rest = cell.places[0].aim(cell.cap, at.min(total - at));
+        cell.floor = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(cell.cap);
+        at += cell.length;
+    }
+    let steps = |cell: &Cell, b: f64| {
+        let place = &cell.places[1];
+        let jerk = 1.0 / place.jerk[0][0].abs().max(place.jerk[1][0].abs());
+        let acceleration = 1.0 / place.acceleration[0][0].abs().max(place.acceleration[1][0].abs());
+        b + cell.length * acceleration.min((jerk * b.sqrt()).sqrt())
+    };
+    for k in 1..cells.len() {
+        cells[k].floor =
+            cells[k].floor.min(steps(&cells[k - 1], cells[k - 1].floor.max(1e-9 * cells[k].cap)));
+    }
+    for k in (1..cells.len()).rev() {
+        cells[k - 1].floor = cells[k - 1].floor.min(steps(&cells[k - 1], cells[k].floor));
+    }
+}
+
+impl Place {
+    /// A b* to begin with: no more than b, than what jerk allows on a turn, and than what it allows so near to rest.
+    fn aim(&self, b: f64, to_rest: f64) -> f64 {
+        let (mut turn, mut ramp) = (0.0_f64, 0.0_f64);
+        for [m1, _, m3] in self.jerk {
+            (turn, ramp) = (turn.max(m3.abs()), ramp.max(m1.abs()));
+        }
+        // b = (9/2 j s²)^(2/3) / ... by JERK_OF_REST: √b³ = j s² / (2/9).
+        let jerk = to_rest * to_rest / (JERK_OF_REST * ramp);
+        let third = |x: f64| libm::cbrt(x * x);
+        b.min(third(1.0 / turn)).min(third(jerk)).max(1e-12)
+    }
+}
+
+/// (ds/dt)² along a profile, asked for in order.
+struct Speeds<'a> {
+    phases: &'a [Phase],
+    at: usize,
+}
+
+impl Speeds<'_> {
+    fn square(&mut self, piece: usize, s: f64) -> f64 {
+        let before =
+            |phase: &Phase| phase.piece < piece || (phase.piece == piece && phase.way(phase.duration) < s);
+        while self.at + 1 < self.phases.len() && before(&self.phases[self.at]) {
+            self.at += 1;
+        }
+        let phase = &self.phases[self.at];
+        let way = (s - phase.start).clamp(0.0, phase.way(phase.duration) - phase.start);
+        let way = if phase.piece > piece { 0.0 } else { way };
+        (phase.speed * phase.speed + 2.0 * phase.acceleration * way).max(0.0)
+    }
+}
+
+/// The states at all nodes; nothing where no way is found.
+fn solve(cells: &[Cell]) -> Option<Vec<State>> {
+    [0.5, 0.1, 0.0].into_iter().find_map(|floor| solve_above(cells, floor))
+}
+
+/// The states at all nodes, with b no less than so much of the floors.
+fn solve_above(cells: &[Cell], floor: f64) -> Option<Vec<State>> {
+    let count = cells.len();
+    if count < 4 {
+        return None;
+    }
+    let (last, before) = (&cells[count - 1], &cells[count - 2]);
+    // Sets at the starts of cells 1 to count - 2; from that of the last but one the last one's ray is met exactly.
+    let landing = Landing::new(before, ray(last.length));
+    let mut sets = vec![Polygon::default(); count - 1];
+    sets[count - 2] = landing.set(before, floor, last.most_from_rest());
+    for k in (1..count - 2).rev() {
+        sets[k] = Polygon::before(&cells[k], floor, &sets[k + 1]);
+        if sets[k].0.is_empty() {
+            return None;
+        }
+    }
+    // From rest, as far along the ray as the set allows.
+    let start = sets[1].farthest(ray(cells[0].length))?.min(cells[0].most_from_rest());
+    if start <= 0.0 {
+        return None;
+    }
+    let mut states = vec![[0.0, 0.0], [start, ray(cells[0].length) * start]];
+    for k in 1..count - 1 {
+        let from = states[k];
+        let w = if k == count - 2 { landing.w(from) } else { sets[k + 1].largest_into(&cells[k], from)? };
+        let to = cells[k].state(from, w, 1.0);
+        states.push([to[0].max(0.0), to[1]]);
+    }
+    states.push([0.0, 0.0]);
+    states.iter().flatten().all(|x| x.is_finite()).then_some(states)
+}
+
+/// The cell before the last: its w is such that it ends on the ray on which an even jerk leads to rest.
+struct Landing {
+    /// w = x b + y c.
+    w: [f64; 2],
+    /// b at its end, by b and c.
+    end: [f64; 2],
+}
+
+impl Landing {
+    /// From `c + w h = -g (b + c h + w h²/2)`.
+    fn new(cell: &Cell, g: f64) -> Self {
+        let h = cell.length;
+        let below = h + 0.5 * g * h * h;
+        let w = [-g / below, -(1.0 + g * h) / below];
+        Self { w, end: [1.0 + 0.5 * h * h * w[0], h + 0.5 * h * h * w[1]] }
+    }
+
+    fn w(&self, [b, c]: State) -> f64 {
+        self.w[0] * b + self.w[1] * c
+    }
+
+    fn set(&self, cell: &Cell, floor: f64, most: f64) -> Polygon {
+        let mut set = Polygon::around(cell, floor);
+        for [x, y, z, room] in cell.conditions() {
+            set.clip(x + z * self.w[0], y + z * self.w[1], room);
+        }
+        set.clip(self.end[0], self.end[1], most);
+        set.clip(-self.end[0], -self.end[1], 0.0);
+        set
+    }
+}
+
+/// A convex set of states, by its corners, counterclockwise.
+#[derive(Clone, Debug, Default)]
+struct Polygon(Vec<State>);
+
+impl Polygon {
+    /// All states at a cell's start that could come from rest and go to rest.
+    ///
+    /// Under √b the jerk's condition vanishes with b: what it forbids there must be said apart, or speeds would bounce off 0.
+    /// With the jerk j a motion that slows down by u needs the speed u² / (2 j) to end that, so `c² <= 8 j √b`: a convex
+    /// set. These are corners of the one for twice the jerk, so that the chords between them take nothing away.
+    fn around(cell: &Cell, floor: f64) -> Self {
+        let place = &cell.places[0];
+        let jerk = 1.0 / place.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
+        // And |½ m' c| <= 1 + |m''| b, whatever the jerk.
+        let c = place.acceleration.iter().map(|[m1, m2]| 2.0 * (1.0 + m2.abs() * cell.cap) / m1.abs());
+        let most = c.fold(f64::INFINITY, f64::min);
+        let at = |share: &f64| {
+            let b = share * cell.cap;
+            [b, (16.0 * jerk * b.sqrt()).sqrt().min(most)]
+        };
+        let levels = [1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.4, 1.0];
+        let mut corners = vec![[0.0, 0.0]];
+        corners.extend(levels.iter().map(at).map(|[b, c]| [b, -c]));
+        corners.extend(levels.iter().rev().map(at));
+        let mut set = Self(corners);
+        set.clip(-1.0, 0.0, -floor * cell.floor);
+        set
+    }
+
+    /// The states at a cell's start from which some w leads into `next`.
+    fn before(cell: &Cell, floor: f64, next: &Self) -> Self {
+        let mut set = Self::around(cell, floor);
+        let (mut upper, mut lower) = (Vec::with_capacity(40), Vec::with_capacity(40));
+        for [x, y, z, room] in cell.conditions().into_iter().chain(next.edges_through(cell)) {
+            if z > 0.0 {
+                upper.push([x / z, y / z, room / z]);
+            } else if z < 0.0 {
+                lower.push([x / -z, y / -z, room / -z]);
+            } else {
+                set.clip(x, y, room);
+            }
+        }
+        set.keep_tight(&mut upper);
+        set.keep_tight(&mut lower);
+        // w <= room - x b - y c for the upper ones, w >= x b + y c - room for the lower.
+        for [x, y, room] in &upper {
+            for [x1, y1, room1] in &lower {
+                set.clip(x + x1, y + y1, room + room1);
+            }
+        }
+        set.simplify();
+        set
+    }
+
+    /// Drops those bounds `room - x b - y c` that on this set are nowhere below some other one.
+    fn keep_tight(&self, bounds: &mut Vec<[f64; 3]>) {
+        let at = |[x, y, room]: &[f64; 3], p: &State| room - x * p[0] - y * p[1];
+        let mut kept: Vec<[f64; 3]> = Vec::with_capacity(bounds.len());
+        for bound in bounds.iter() {
+            let above = |one: &[f64; 3], other: &[f64; 3]| self.0.iter().all(|p| at(one, p) >= at(other, p));
+            if kept.iter().any(|other| above(bound, other)) {
+                continue;
+            }
+            kept.retain(|other| !above(other, bound));
+            kept.push(*bound);
+        }
+        *bounds = kept;
+    }
+
+    /// The conditions for getting into this set through a cell.
+    fn edges_through(&self, cell: &Cell) -> impl Iterator<Item = [f64; 4]> {
+        let h = cell.length;
+        let corners = &self.0;
+        let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+        edges.map(move |(p, q)| {
+            // To the left of the edge.
+            let (x, y) = (q[1] - p[1], p[0] - q[0]);
+            let room = x * p[0] + y * p[1];
+            // b at the end is b + h c + h²/2 w, c there is c + h w.
+            [x, x * h + y, 0.5 * x * h * h + y * h, room]
+        })
+    }
+
+    /// The largest w by which a cell leads from a state into this set; nothing if there is none at all.
+    fn largest_into(&self, cell: &Cell, [b, c]: State) -> Option<f64> {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for [x, y, z, room] in cell.conditions().into_iter().chain(self.edges_through(cell)) {
+            let left = room - x * b - y * c;
+            if z > 0.0 {
+                high = high.min(left / z);
+            } else if z < 0.0 {
+                low = low.max(left / z);
+            }
+        }
+        if self.0.is_empty() || !(high.is_finite() && low.is_finite()) {
+            return None;
+        }
+        // They cross by no more than a rounding error, for the state is in the set before.
+        Some(if high >= low { high } else { 0.5 * (high + low) })
+    }
+
+    /// How far b can go along the ray `c = slope b`.
+    fn farthest(&self, slope: f64) -> Option<f64> {
+        let corners = &self.0;
+        let mut far: Option<f64> = None;
+        for (p, q) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+            let (d0, d1) = (p[1] - slope * p[0], q[1] - slope * q[0]);
+            if (d0 <= 0.0) != (d1 <= 0.0) {
+                let b = p[0] + (q[0] - p[0]) * d0 / (d0 - d1);
+                far = Some(far.map_or(b, |far| far.max(b)));
+            }
+        }
+        far
+    }
+
+    /// Keeps what fulfils `x b + y c <= room`.
+    fn clip(&mut self, x: f64, y: f64, room: f64) {
+        let off = |p: &State| x * p[0] + y * p[1] - room;
+        let scale = self.0.iter().map(|p| (x * p[0]).abs() + (y * p[1]).abs()).fold(room.abs(), f64::max);
+        let slack = 1e-13 * scale;
+        if self.0.iter().all(|p| off(p) <= slack) {
+            return;
+        }
+        let corners = std::mem::take(&mut self.0);
+        for (p, q) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+            let (d0, d1) = (off(p), off(q));
+            if d0 <= slack {
+                self.0.push(*p);
+            }
+            if (d0 > slack && d1 < -slack) || (d0 < -slack && d1 > slack) {
+                let share = d0 / (d0 - d1);
+                self.0.push([p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])]);
+            }
+        }
+    }
+
+    /// Takes away corners that cost little until there are few.
+    fn simplify(&mut self) {
+        while self.0.len() > CORNERS {
+            let count = self.0.len();
+            let area = |k: usize| {
+                let (a, b, c) = (self.0[(k + count - 1) % count], self.0[k], self.0[(k + 1) % count]);
+                ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()
+            };
+            let least = (0..count).min_by(|a, b| area(*a).total_cmp(&area(*b)));
+            if let Some(least) = least {
+                self.0.remove(least);
+            }
+        }
+    }
+}
+
+/// The phases through the states, slowed down until the limits hold between the places that were looked at too; and by how
+/// much each cell exceeded its limits on acceleration and jerk.
+fn emit(
+    machine: &Machine,
+    section: &[Piece],
+    cells: &[Cell],
+    states: &[State],
+) -> (Profile, Vec<(f64, f64)>) {
+    let mut profile = Profile::new();
+    let mut excesses = Vec::with_capacity(cells.len());
+    let mut slower = 1.0_f64;
+    for (k, (cell, state)) in cells.iter().zip(states.windows(2)).enumerate() {
+        let (from, to) = (state[0], state[1]);
+        let h = cell.length;
+        if k == 0 || k + 1 == cells.len() {
+            let b = from[0].max(to[0]);
+            let jerk = JERK_OF_REST * b * b.sqrt() / (h * h);
+            let duration = libm::cbrt(6.0 * h / jerk);
+            let (speed, acceleration) = if k == 0 { (0.0, 0.0) } else { (b.sqrt(), -jerk * duration) };
+            let phase = Phase::even(cell.piece, cell.start, speed, acceleration, duration);
+            profile.push(Phase { jerk, ..phase });
+            profile.limiting.jerk
+                [usize::from(cell.places[1].jerk[1][0].abs() > cell.places[1].jerk[0][0].abs())] += duration;
+            excesses.push((1.0, 1.0));
+            continue;
+        }
+        let w = (to[1] - from[1]) / h;
+        let phase =
+            Phase::even(cell.piece, cell.start, from[0].sqrt(), 0.5 * from[1], duration(h, from, to, w));
+        profile.push(Phase { growth: 0.5 * w, ..phase });
+        let mut excess = (0.0_f64, 0.0_f64);
+        // b is largest at an end, or where c is 0.
+        let top = if from[1] > 0.0 && to[1] < 0.0 { from[0] - 0.5 * from[1] * from[1] / w } else { 0.0 };
+        let speed = from[0].max(to[0]).max(top) / cell.cap;
+        for (share, place) in
+            [(0.0, Some(cell.places[0])), (0.5, Some(cell.places[1])), (1.0, Some(cell.places[2]))]
+                .into_iter()
+                .chain(
+                    [0.25, 0.75].map(|share| {
+                        (share, Place::at(machine, &section[cell.piece], cell.start + share * h))
+                    }),
+                )
+        {
+            let Some(place) = place else { continue };
+            let state = cell.state(from, w, share);
+            let (acceleration, jerk) = place.shares(state, w);
+            excess = (excess.0.max(acceleration), excess.1.max(jerk));
+        }
+        limit(cell, from, to, excess, phase.duration, &mut profile);
+        slower = slower.max(excess.0.sqrt()).max(libm::cbrt(excess.1)).max(speed.sqrt());
+        let beyond = |share: f64| if share > EXCESS { share } else { 1.0 };
+        excesses.push((beyond(excess.0), beyond(excess.1)));
+    }
+    (profile.slowed(slower), excesses)
+}
+
+/// Books the time of a cell to what is nearest to its limit.
+fn limit(cell: &Cell, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
+    let limiting = &mut profile.limiting;
+    let place = &cell.places[1];
+    let w = (to[1] - from[1]) / cell.length;
+    let [b, c] = cell.state(from, w, 0.5);
+    let speed = from[0].max(to[0]) / cell.cap;
+    if speed >= excess.0.max(excess.1) {
+        let fastest = [0, 1].map(|k| place.speed[k] * place.speed[k] * cell.cap);
+        if fastest[0].max(fastest[1]) > 0.999 {
+            limiting.speed[usize::from(fastest[1] > fastest[0])] += duration;
+        } else if place.bend * cell.cap > 0.999 * cell.row_limit {
+            limiting.rows += duration;
+        } else {
+            limiting.pen += duration;
+        }
+    } else if excess.1 >= excess.0 {
+        let of = |[m1, m2, m3]: [f64; 3]| (0.5 * m1 * w + 1.5 * m2 * c + m3 * b).abs();
+        limiting.jerk[usize::from(of(place.jerk[1]) > of(place.jerk[0]))] += duration;
+    } else {
+        let of = |[m1, m2]: [f64; 2]| (0.5 * m1 * c + m2 * b).abs();
+        let k = usize::from(of(place.acceleration[1]) > of(place.acceleration[0]));
+        let [m1, m2] = place.acceleration[k];
+        let turning = (m2 * b).abs() > (0.5 * m1 * c).abs();
+        *(if turning { &mut limiting.turning[k] } else { &mut limiting.acceleration[k] }) += duration;
+    }
+}
+
+/// The time over a length with b from one end to the other a parabola: `d²s/dt² = u + g s` with `g = w / 2`.
+///
+/// With k² = g, `v k + u` grows as `exp(k t)` and `v k - u` falls as `exp(-k t)`; with k² = -g the point (k v, u) turns by k t.
+fn duration(length: f64, from: State, to: State, w: f64) -> f64 {
+    let (v0, v1) = (from[0].max(0.0).sqrt(), to[0].max(0.0).sqrt());
+    let (u0, u1) = (0.5 * from[1], 0.5 * to[1]);
+    let mean = from[0] + 0.5 * length * (from[1] + 0.25 * length * w);
+    if (w * length * length).abs() < 1e-4 * mean {
+        // b is nearly a line; what w adds: (w / 4) ∫ s (h - s) b^(-3/2) ds.
+        return 2.0 * length / (v0 + v1) + w * length * length * length / (24.0 * mean * mean.sqrt());
+    }
+    let k = (0.5 * w).abs().sqrt();
+    if w > 0.0 {
+        let ratio = if u0 + u1 > 0.0 { (v1 * k + u1) / (v0 * k + u0) } else { (v0 * k - u0) / (v1 * k - u1) };
+        libm::log(ratio) / k
+    } else {
+        (libm::atan2(u0, k * v0) - libm::atan2(u1, k * v1)) / k
+    }
+}
+
+/// A straight way in joint space: even jerk up to the largest acceleration, and so on, both halves alike.
+fn straight(machine: &Machine, change: Vector2<f64>) -> Profile {
+    let least = |of: &dyn Fn(usize) -> f64| of(0).min(of(1));
+    let motors = machine.motors();
+    let v = least(&|k| motors[k].max_speed / change[k].abs());
+    let a = least(&|k| motors[k].max_acceleration / change[k].abs());
+    let j = least(&|k| motors[k].max_jerk.unwrap_or(f64::INFINITY) / change[k].abs());
+    // The time to reach the speed V is V/a + a/j, or 2 √(V/j) where a is not reached; the way from rest to rest without
+    // a stretch at V is V times that.
+    let time_to = |speed: f64| if speed >= a * a / j { speed / a + a / j } else { 2.0 * (speed / j).sqrt() };
+    let mut top = v;
+    if top * time_to(top) > 1.0 {
+        let r = a / j;
+        top = 0.5 * a * ((r * r + 4.0 / a).sqrt() - r);
+        if top < a * r {
+            top = libm::cbrt(0.25 * j);
+        }
+    }
+    let peak = a.min((top * j).sqrt());
+    let ramp = if j.is_finite() { peak / j } else { 0.0 };
+    let steady = (top / peak - ramp).max(0.0);
+    let cruise = ((1.0 - top * (2.0 * ramp + steady)) / top).max(0.0);
+    let mut profile = Profile::new();
+    let (mut s, mut speed, mut acceleration) = (0.0, 0.0, 0.0);
+    let jerk = if j.is_finite() { j } else { 0.0 };
+    for (jerk, time) in [
+        (jerk, ramp),
+        (0.0, steady),
+        (-jerk, ramp),
+        (0.0, cruise),
+        (-jerk, ramp),
+        (0.0, steady),
+        (jerk, ramp),
+    ] {
+        if time > 0.0 {
+            let phase = Phase { jerk, ..Phase::even(0, s, speed, acceleration, time) };
+            profile.push(phase);
+            s = phase.way(time);
+            speed += time * (acceleration + 0.5 * jerk * time);
+            acceleration += jerk * time;
+        }
+    }
+    profile
+}
+
+/// A law that knows no jerk, slowed down until its jumps in acceleration, at most from one limit to the other, are none
+/// that rows a period apart could show.
+fn slowed_until_smooth(machine: &Machine, profile: Profile, cap: &SpeedCap) -> Profile {
+    let of = |motor: &kinematics::Motor| {
+        motor.max_jerk.map_or(1.0, |jerk| (2.0 * motor.max_acceleration / (jerk * cap.period)).sqrt())
+    };
+    let slower = machine.motors().iter().map(of).fold(1.0, f64::max);
+    profile.slowed(slower)
+}
