@@ -122,6 +122,7 @@ pub(crate) enum MessageFormat {
 }
 
 /// How a plan is made.
+#[expect(clippy::struct_excessive_bools, reason = "a flag of the command line is a bool")]
 #[derive(Debug, Args)]
 pub(crate) struct Planning {
     /// Largest distance between drawing and pen, before rounding to ticks
