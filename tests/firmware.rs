@@ -361,6 +361,14 @@ fn feed(device: &mut dyn Device, text: &str, end: char) -> Ink {
     for line in text.split(['\n', '\r']).filter(|line| !line.is_empty()) {
         device.answers();
         device.receive(format!("{line}{end}").as_bytes(), now_us);
+        if line.starts_with("M0") {
+            // It pauses once everything before has been done; then another pen is put in.
+            while let Some(next_us) = device.wake_us() {
+                now_us = next_us.max(now_us + 1);
+                device.advance(now_us);
+            }
+            device.receive(b"~", now_us);
+        }
         // Until it has answered: one line is never in its way.
         loop {
             let answers = device.answers().concat();

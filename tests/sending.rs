@@ -307,6 +307,21 @@ fn plans_of_every_format_and_files_of_the_machines_own_words_are_sent() {
 }
 
 #[test]
+fn another_pen_is_waited_for() {
+    let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;SP2;PU100,200;PD300,200;PU;");
+    let plan = desk.plan();
+    let device = desk.device("gcode", "tty", &["--haste", HASTE]);
+    let mut sender = desk.send("gcode", "tty", &[]);
+    let mut sender = sender.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
+    std::io::Write::write_all(&mut sender.stdin.take().expect("its input"), b"\n").expect("it takes Enter");
+    let output = sender.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("waits for another pen"), "{said}");
+    let wanted: Lines = wanted("gcode", &plan).into_iter().map(|(_, line)| (1, line)).collect();
+    assert_eq!(device.ink(), wanted);
+}
+
+#[test]
 fn machines_that_do_not_answer_get_lines_at_once_or_at_their_time() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;");
     let plan = desk.plan();

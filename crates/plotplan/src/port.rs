@@ -23,6 +23,8 @@ pub(crate) enum Event {
     Lost(u32),
     /// Somebody wants it to stop.
     Interrupted,
+    /// Somebody has pressed Enter.
+    Enter,
 }
 
 /// An open port. What it hears goes to the channel that it was opened with.
@@ -125,6 +127,16 @@ impl Events {
         ctrlc::set_handler(move || {
             let _ = sender.send(Event::Interrupted);
         })
+    }
+
+    /// Lets the next line of standard input come as an event.
+    pub(crate) fn wait_for_enter(&self) {
+        let sender = self.sender.clone();
+        std::thread::spawn(move || {
+            if std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0) {
+                let _ = sender.send(Event::Enter);
+            }
+        });
     }
 
     /// The next event, if one comes in time.

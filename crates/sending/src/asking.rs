@@ -15,6 +15,9 @@ const PATIENCE_US: u64 = 2_000_000;
 const QUEUE: usize = 40;
 /// A machine that is going somewhere is asked again after this.
 const ASK_AGAIN_US: u64 = 200_000;
+/// The line at which the machine waits for another pen; soon after it the machine is asked whether it does.
+const PAUSE: &str = "M0";
+const PAUSE_US: u64 = 300_000;
 /// Questions without any answer before giving up.
 const TRIES: u32 = 60;
 /// Where grbl says it is, is its steps': half a step off, micrometres. 25 steps/mm are the coarsest that this holds for.
@@ -57,6 +60,9 @@ pub struct Asking {
     /// Where it stood before anything was said.
     begins: Option<[i64; 2]>,
     lines: Lines,
+    /// Whether grbl said that it holds when last asked, and whether it is to be told to go on.
+    holds: bool,
+    goes_on: bool,
     /// Whether an EBB's motors were moving when last asked.
     moving: bool,
     /// grbl's offset of work coordinates, micrometres.
@@ -82,6 +88,8 @@ impl Asking {
             deadline_us: 0,
             begins: None,
             lines: Lines::default(),
+            holds: false,
+            goes_on: false,
             moving: true,
             offset: [0; 2],
             stopping: None,
@@ -142,6 +150,9 @@ impl Asking {
         }
         if line.starts_with("<Alarm") {
             return Answer::Refused("the machine is in alarm: home it or unlock it first".to_owned());
+        }
+        if line.starts_with('<') {
+            self.holds = line.starts_with("<Hold");
         }
         match grbl_report(line, &mut self.offset) {
             Some((place, moving)) => Answer::Standing { place, moving },
@@ -209,7 +220,15 @@ impl Asking {
         self.state = State::Asking { tries: 0, again_us: now_us, stood: None };
     }
 
+    /// Whether a pause has no answer yet: nothing is said after it. Lines before it may lack theirs, too.
+    fn pauses(&self) -> bool {
+        self.said > self.taken && self.steps[self.said - 1].text.starts_with(PAUSE)
+    }
+
     fn patience(&self) -> u64 {
+        if self.pauses() {
+            return PAUSE_US;
+        }
         let waiting = &self.steps[self.taken.saturating_sub(QUEUE)..self.said];
         PATIENCE_US + 2 * waiting.iter().map(|step| step.lasts_us).sum::<u64>()
     }
@@ -220,7 +239,9 @@ impl Asking {
         if self.said == self.taken {
             return true;
         }
-        if self.is_ebb() {
+        // What follows a pause is said once it is over: a machine that is stopped meanwhile must not draw with the wrong pen.
+        if self.is_ebb() || self.steps[self.taken..self.said].iter().any(|step| step.text.starts_with(PAUSE))
+        {
             return false;
         }
         let waiting: usize = self.steps[self.taken..self.said].iter().map(|step| step.text.len() + 1).sum();
@@ -280,6 +301,10 @@ impl Conversation for Asking {
             self.outcome = Some(failed);
             return out.into_bytes();
         }
+        if std::mem::take(&mut self.goes_on) {
+            self.holds = false;
+            return b"~".to_vec();
+        }
         match self.state {
             State::Asking { tries, again_us, stood } => {
                 if now_us < again_us {
@@ -317,7 +342,7 @@ impl Conversation for Asking {
         if self.outcome.is_some() {
             return None;
         }
-        if self.failing.is_some() {
+        if self.failing.is_some() || self.goes_on {
             return Some(0);
         }
         match self.state {
@@ -336,11 +361,20 @@ impl Conversation for Asking {
             self.outcome = Some(Outcome::Stopped { row: 0 });
             return;
         }
+        self.goes_on |= self.waits_for_hand();
         // Lines that were said and found not to be done are said again: they are part of what was begun.
         let (tail, row) = self.script.stopping(&self.steps[..self.ever]);
         self.steps.truncate(self.ever);
         self.steps.extend(tail);
         self.stopping = Some(row);
+    }
+
+    fn waits_for_hand(&self) -> bool {
+        self.holds && self.pauses()
+    }
+
+    fn go_on(&mut self) {
+        self.goes_on |= self.waits_for_hand();
     }
 
     fn reconnected(&mut self, now_us: u64) {

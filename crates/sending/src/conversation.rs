@@ -54,6 +54,12 @@ pub trait Conversation {
     fn stop(&mut self, now_us: u64);
     /// The port is there again after it was away: whatever was on the way is lost.
     fn reconnected(&mut self, now_us: u64);
+    /// Whether the machine has paused and waits for a hand: another pen is to be put in.
+    fn waits_for_hand(&self) -> bool {
+        false
+    }
+    /// The hand has done its work.
+    fn go_on(&mut self) {}
     /// How far it has come.
     fn progress(&self) -> Progress;
     /// How it ended, once it has.

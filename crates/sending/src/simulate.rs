@@ -39,6 +39,10 @@ pub fn run(
             conversation.stop(now_us);
         }
         let mut talked = false;
+        // Whoever watches changes the pen at once.
+        if conversation.waits_for_hand() {
+            conversation.go_on();
+        }
         if plugged {
             let heard = machine.heard(now_us);
             if !heard.is_empty() {

@@ -85,9 +85,7 @@ fn warn_of_pens(protocol: Protocol, input: &Input) {
         Protocol::XySerial | Protocol::Ebb => {
             "this protocol knows no pens, all strokes are drawn with the same one"
         }
-        Protocol::Gcode => {
-            "the machine pauses (M0) where the pen is to be changed, and waits for its cycle start"
-        }
+        Protocol::Gcode => "the machine pauses (M0) where the pen is to be changed",
     };
     let Ok(plan) = formats::read_plan(&input.bytes) else { return };
     let pens: std::collections::BTreeSet<u16> = plan.table.rows.iter().map(|row| row.pen).collect();
@@ -284,7 +282,7 @@ impl Wire {
                     return Err(Failure::Io(anyhow::anyhow!("{} has gone away", self.settings.path)));
                 }
                 Some(Event::Interrupted) => return Err(Failure::Interrupted),
-                None => {}
+                Some(Event::Enter) | None => {}
             }
         }
     }
@@ -294,10 +292,20 @@ impl Wire {
         let progress = SendingProgress::new(conversation.progress().of_us);
         let mut interrupts = 0;
         let mut shown = self.begun;
+        let mut waits = false;
         let outcome = loop {
             if now().duration_since(shown) >= LOOK_AGAIN {
                 shown = now();
                 progress.show(&conversation.progress());
+            }
+            if conversation.waits_for_hand() != waits {
+                waits = !waits;
+                if waits {
+                    terminal::say(
+                        "the machine waits for another pen: put it in, then press Enter (or the machine's cycle start)\n",
+                    );
+                    self.events.wait_for_enter();
+                }
             }
             if let Some(lost_at) = self.lost_at {
                 if self.look_again() {
@@ -335,6 +343,7 @@ impl Wire {
                     }
                     self.lose();
                 }
+                Some(Event::Enter) => conversation.go_on(),
                 Some(Event::Interrupted) => {
                     interrupts += 1;
                     if interrupts > 1 {

@@ -46,6 +46,8 @@ pub struct Grbl {
     lost: u64,
     stalled_us: u64,
     now_us: u64,
+    /// At `M0`, until `~`.
+    paused: bool,
 }
 
 impl Default for Grbl {
@@ -74,6 +76,7 @@ impl Grbl {
             lost: 0,
             stalled_us: 0,
             now_us: 0,
+            paused: false,
         }
     }
 
@@ -82,7 +85,7 @@ impl Grbl {
     }
 
     fn report(&mut self) {
-        let state = if self.now_us < self.stalled_us {
+        let state = if self.now_us < self.stalled_us || self.paused {
             "Hold:0"
         } else if self.blocks.is_empty() && self.now_us >= self.dwell_us {
             "Idle"
@@ -116,7 +119,11 @@ impl Grbl {
 
     /// Reads one line if it may; whether it did.
     fn take(&mut self) -> bool {
-        if self.now_us < self.dwell_us || self.now_us < self.stalled_us || self.blocks.len() >= BLOCKS {
+        if self.paused
+            || self.now_us < self.dwell_us
+            || self.now_us < self.stalled_us
+            || self.blocks.len() >= BLOCKS
+        {
             return false;
         }
         let Some(end) = self.buffer.iter().position(|byte| *byte == b'\n') else { return false };
@@ -127,6 +134,11 @@ impl Grbl {
             return false;
         }
         self.buffer.drain(..=end);
+        if line.split([' ', ';']).next() == Some("M0") {
+            // The answer comes when it goes on.
+            self.paused = true;
+            return true;
+        }
         let answer = match self.follow(&line) {
             Ok(()) => "ok".to_owned(),
             Err(code) => format!("error:{code}"),
@@ -152,7 +164,7 @@ impl Grbl {
             match (letter, number) {
                 ("G", "0" | "1" | "2" | "3") => self.motion = value as u8,
                 ("G", "4") => dwell = true,
-                ("G", "17" | "21" | "90") | ("M", "0") => {}
+                ("G", "17" | "21" | "90") => {}
                 ("G", "93") => self.inverse = true,
                 ("G", "94") => (self.inverse, self.feed) = (false, None),
                 ("M", "3") => spindle = Some(true),
@@ -242,7 +254,12 @@ impl Device for Grbl {
         for &byte in bytes {
             match byte {
                 b'?' => self.report(),
-                b'!' | b'~' | 0x18 | b'\r' => {}
+                b'~' => {
+                    if std::mem::take(&mut self.paused) {
+                        self.answer("ok");
+                    }
+                }
+                b'!' | 0x18 | b'\r' => {}
                 _ if self.buffer.len() >= BUFFER => self.lost += 1,
                 _ => self.buffer.push(byte),
             }
