@@ -16,7 +16,10 @@ const MAY_KNOW: &[(&str, &[&str])] = &[
     ("verify", &["drawing", "kinematics", "plan"]),
     ("formats", &["drawing", "plan"]),
     ("sending", &["drawing", "formats", "plan"]),
-    ("plotplan", &["drawing", "formats", "hpgl", "kinematics", "ordering", "plan", "planner", "sending", "verify"]),
+    (
+        "plotplan",
+        &["drawing", "formats", "hpgl", "kinematics", "ordering", "plan", "planner", "sending", "verify"],
+    ),
     ("xtask", &["drawing", "formats", "hpgl", "kinematics", "plan", "planner"]),
 ];
 
