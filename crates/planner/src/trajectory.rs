@@ -417,3 +417,47 @@ impl Rows<'_> {
         ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks }, exact: [exact.x, exact.y] }
     }
 }
+
+#[cfg(test)]
+#[path = "../tests/machines/mod.rs"]
+mod machines;
+
+#[cfg(test)]
+mod tests {
+    use drawing::{Pen, Point, Span};
+
+    use super::{machines, *};
+
+    /// Enough strokes for several batches: spirals about the base, so that turns differ from stroke to stroke, and ticks.
+    fn crowd() -> Drawing {
+        let spiral = |k: u32| {
+            let point = |j: u32| {
+                let (sin, cos) = libm::sincos(0.1 * f64::from(j) + 0.7 * f64::from(k));
+                let r = 150.0 + 0.1 * f64::from(k) + 0.02 * f64::from(j);
+                Point::new(r * cos, r * sin)
+            };
+            Stroke::polyline(Pen(1), (0..90).map(point).collect(), Span::default()).expect("there are points")
+        };
+        Drawing { strokes: (0..100).map(spiral).collect() }
+    }
+
+    #[test]
+    fn rows_are_the_same_at_any_number_of_threads_and_planned_anew() {
+        let machine = machines::arm();
+        let in_pool = |threads: usize| -> Vec<ExactRow> {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| {
+                let mut trajectory = plan(&machine, crowd(), &Settings::new(0.1, 10_000)).expect("a plan");
+                let kept: Vec<ExactRow> = trajectory.rows().collect();
+                assert_eq!(kept.len() as u64, trajectory.row_count());
+                assert!(trajectory.kept.take().is_some());
+                assert!(trajectory.rows().eq(kept.iter().copied()));
+                kept
+            })
+        };
+        let alone = in_pool(1);
+        assert!(alone.len() > 1000);
+        assert_eq!(alone, in_pool(2));
+        assert_eq!(alone, in_pool(5));
+    }
+}

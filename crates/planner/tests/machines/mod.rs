@@ -1,4 +1,5 @@
 //! Machines for the planner's tests, by hand: the shapes of the four seeds with round numbers.
+#![allow(dead_code, reason = "not every test that shares this module needs all of it")]
 
 use drawing::Rect;
 use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar, TwoLink};
@@ -69,7 +70,6 @@ pub(crate) fn polar() -> Machine {
 }
 
 /// The machine with motors that need so many s to build up their largest acceleration.
-#[allow(dead_code, reason = "not every test that shares this module needs it")]
 pub(crate) fn with_jerk(machine: &Machine, build_up: f64) -> Machine {
     let mut parts = machine.parts().clone();
     for motor in &mut parts.motors {
