@@ -24,7 +24,7 @@ use crate::{
 const BATCH: usize = 4096;
 
 /// A plan whose motion has no more phases than this is kept, so that its rows can be had again without planning anew.
-const KEPT_PHASES: usize = 1 << 18;
+const KEPT_PHASES: usize = 1 << 19;
 
 /// One step of a plan.
 #[derive(Clone, Debug)]
