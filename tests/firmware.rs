@@ -104,6 +104,7 @@ fn hold(machine: &Machine, drawing: &Drawing, ink: &Lines, scale: f64) -> Certif
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: 1_000_000,
         rows: 0,
+        lift_overlap_us: 0,
         duration_us: 0,
     };
     let mut verifier = Verifier::new(machine, drawing, &header, TOLERANCE);

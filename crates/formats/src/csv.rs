@@ -49,7 +49,11 @@ pub fn write<W: Write + ?Sized>(
             text.byte(b' ').float(jerk);
         }
     }
-    text.str("\n# period_us: ").int(header.period_us).str("\n# rows: ").int(header.rows);
+    text.str("\n# period_us: ").int(header.period_us);
+    if header.lift_overlap_us > 0 {
+        text.str("\n# lift_overlap_us: ").int(header.lift_overlap_us);
+    }
+    text.str("\n# rows: ").int(header.rows);
     text.str("\n# duration_us: ").int(header.duration_us).str("\nt_us,pen");
     for Motor { name, .. } in &header.motors {
         text.byte(b',').str(name);
@@ -122,7 +126,13 @@ pub fn read(bytes: &[u8]) -> Result<TickTable, ReadError> {
     check
         .finish(stated_rows.unwrap_or(check.count()), stated_us.unwrap_or(check.last_us()))
         .map_err(|error| ReadError::CutOff { line: last.number, why: error.to_string() })?;
-    let header = assemble(machine, motors, placement, notes.count("period_us")?, &rows)?;
+    let header = assemble(
+        machine,
+        motors,
+        placement,
+        [notes.count("period_us")?, notes.count("lift_overlap_us")?],
+        &rows,
+    )?;
     Ok(TickTable { header, rows })
 }
 

@@ -200,7 +200,7 @@ pub(crate) fn assemble(
     machine: &str,
     motors: [Motor; MOTORS],
     placement: [f64; 6],
-    period_us: Option<u64>,
+    [period_us, lift_overlap_us]: [Option<u64>; 2],
     rows: &[Row],
 ) -> Result<Header, HeaderError> {
     let shortest = || rows.windows(2).map(|pair| pair[1].t_us - pair[0].t_us).min().unwrap_or(0);
@@ -209,6 +209,7 @@ pub(crate) fn assemble(
         motors,
         placement,
         period_us: period_us.unwrap_or_else(shortest),
+        lift_overlap_us: lift_overlap_us.unwrap_or(0),
         rows: rows.len() as u64,
         duration_us: rows.last().map_or(0, |row| row.t_us),
     };

@@ -135,7 +135,11 @@ fn write_header<W: Write + ?Sized>(text: &mut Text<'_, W>, header: &Header) {
     for (index, &coefficient) in header.placement.iter().enumerate() {
         text.str(if index == 0 { "" } else { ", " }).float(coefficient);
     }
-    text.str("],\n    \"period_us\": ").int(header.period_us).str(",\n    \"rows\": ").int(header.rows);
+    text.str("],\n    \"period_us\": ").int(header.period_us);
+    if header.lift_overlap_us > 0 {
+        text.str(",\n    \"lift_overlap_us\": ").int(header.lift_overlap_us);
+    }
+    text.str(",\n    \"rows\": ").int(header.rows);
     text.str(",\n    \"duration_us\": ").int(header.duration_us).str("\n  },\n");
 }
 
@@ -184,6 +188,8 @@ struct WirePlan {
     motors: [WireMotor; MOTORS],
     placement: [f64; 6],
     period_us: u64,
+    #[serde(default)]
+    lift_overlap_us: u64,
     rows: u64,
     duration_us: u64,
 }
@@ -230,6 +236,7 @@ pub fn read(bytes: &[u8]) -> Result<(Document, TickTable), ReadError> {
         }),
         placement: plan.placement,
         period_us: plan.period_us,
+        lift_overlap_us: plan.lift_overlap_us,
         rows: plan.rows,
         duration_us: plan.duration_us,
     };

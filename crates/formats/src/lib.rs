@@ -32,7 +32,7 @@
 //! let motors = ["arm1", "arm2"].map(|name| Motor { name: name.to_owned(), limits });
 //! let placement = [1.0, 0.0, 0.0, 1.0, 12.7, 76.2];
 //! let header =
-//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, rows: 2, duration_us: 10_000 };
+//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, lift_overlap_us: 0, rows: 2, duration_us: 10_000 };
 //! let rows = [Row { t_us: 0, pen: 0, ticks: [800, 0] }, Row { t_us: 10_000, pen: 0, ticks: [801, -1] }];
 //!
 //! let mut bytes = Vec::new();

@@ -85,6 +85,9 @@ fn write_header<W: Write + ?Sized>(text: &mut Text<'_, W>, header: &Header) {
         text.str("; placement ").str(names).str(": ").float(pair[0]).byte(b' ').float(pair[1]).byte(b'\n');
     }
     text.str("; period_us: ").int(header.period_us);
+    if header.lift_overlap_us > 0 {
+        text.str("\n; lift_overlap_us: ").int(header.lift_overlap_us);
+    }
     text.str("\nbegin 1 ").int(header.rows.saturating_sub(1)).byte(b' ').int(header.duration_us).byte(b'\n');
 }
 
@@ -219,7 +222,13 @@ fn read_header(notes: &Notes<'_>, begin: Line, rows: &[Row]) -> Result<Header, R
         notes.array("placement c d", begin)?,
         notes.array("placement e f", begin)?,
     ];
-    Ok(assemble(machine, motors, [a, b, c, d, e, f], notes.count("period_us")?, rows)?)
+    Ok(assemble(
+        machine,
+        motors,
+        [a, b, c, d, e, f],
+        [notes.count("period_us")?, notes.count("lift_overlap_us")?],
+        rows,
+    )?)
 }
 
 /// Gives the last row its pen, which the line after it says. Where the pen goes up, and at the start, there has to

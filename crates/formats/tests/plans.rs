@@ -27,27 +27,31 @@ fn table() -> impl Strategy<Value = TickTable> {
     let row = (1..5_000_000u64, 0..9u16, -1_000_000_000..1_000_000_000i64, -99..99i64);
     let rows = proptest::collection::vec(row, 1..60);
     let placement = proptest::array::uniform6(-1e4..1e4f64);
-    (rows, placement, limits(), limits(), 1..10_000_000u64).prop_map(|(steps, placement, a, b, period_us)| {
-        let mut t_us = 0;
-        let rows: Vec<Row> = steps
-            .into_iter()
-            .enumerate()
-            .map(|(index, (step, pen, x, y))| {
-                t_us += if index == 0 { 0 } else { step };
-                Row { t_us, pen: if index == 0 { 0 } else { pen }, ticks: [x, y] }
-            })
-            .collect();
-        let motor = |name: &str, limits| Motor { name: name.into(), limits };
-        let header = Header {
-            machine: "mine".into(),
-            motors: [motor("one", a), motor("two", b)],
-            placement,
-            period_us,
-            rows: rows.len() as u64,
-            duration_us: t_us,
-        };
-        TickTable { header, rows }
-    })
+    let overlap = prop_oneof![Just(0u64), 1..1_000_000u64];
+    (rows, placement, limits(), limits(), 1..10_000_000u64, overlap).prop_map(
+        |(steps, placement, a, b, period_us, lift_overlap_us)| {
+            let mut t_us = 0;
+            let rows: Vec<Row> = steps
+                .into_iter()
+                .enumerate()
+                .map(|(index, (step, pen, x, y))| {
+                    t_us += if index == 0 { 0 } else { step };
+                    Row { t_us, pen: if index == 0 { 0 } else { pen }, ticks: [x, y] }
+                })
+                .collect();
+            let motor = |name: &str, limits| Motor { name: name.into(), limits };
+            let header = Header {
+                machine: "mine".into(),
+                motors: [motor("one", a), motor("two", b)],
+                placement,
+                period_us,
+                lift_overlap_us,
+                rows: rows.len() as u64,
+                duration_us: t_us,
+            };
+            TickTable { header, rows }
+        },
+    )
 }
 
 fn small() -> TickTable {
@@ -68,6 +72,7 @@ fn small() -> TickTable {
         motors: ["arm1", "arm2"].map(|name| Motor { name: name.into(), limits }),
         placement: [1.0, 0.0, 0.0, 1.0, 12.7, 76.2],
         period_us: 10_000,
+        lift_overlap_us: 0,
         rows: rows.len() as u64,
         duration_us: 350_000,
     };

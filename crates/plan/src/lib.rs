@@ -51,6 +51,8 @@ pub struct Header {
     pub placement: [f64; 6],
     /// Time between rows while anything moves, in whole microseconds.
     pub period_us: u64,
+    /// For how much of the time that a lift takes the motors may already travel, in microseconds; mostly 0.
+    pub lift_overlap_us: u64,
     /// How many rows there are.
     pub rows: u64,
     /// Time of the last row, in microseconds.

@@ -1,7 +1,7 @@
 //! Lifting the pen's path into joint space, adaptively, with what a time law must know.
 
-use drawing::{Point, Segment};
-use kinematics::{Fault, Joints, Machine, OutOfReach};
+use drawing::{Point, Segment, Vec2};
+use kinematics::{Fault, Geometry, Joints, Machine, OutOfReach};
 use nalgebra::Vector2;
 
 use crate::path::{Piece, Section};
@@ -154,20 +154,26 @@ impl Cell {
         };
         let known = |k: usize| (self.first[k], self.second[k]);
         let places = [known(0), at(0.25)?, known(1), at(0.75)?, known(2)];
-        let half = |from: usize| {
+        let parts = [0, 2].map(|from| {
             let places = [places[from], places[from + 1], places[from + 2]];
-            let (first, second) = (places.map(|place| place.0), places.map(|place| place.1));
+            (places.map(|place| place.0), places.map(|place| place.1))
+        });
+        // Of both halves, for where one of them has its bend change sign it shows none in its middle.
+        let bulges = parts.map(|(first, second)| bulge(machine, self.pen_speed, &first, &second));
+        let slack = 0.5 * bulges[0].max(bulges[1]);
+        let half = |which: usize| {
+            let (first, second) = parts[which];
             Self {
                 length: 0.5 * self.length,
-                start: self.start + 0.25 * from as f64 * self.length,
-                slack: 0.5 * bulge(machine, self.pen_speed, &first, &second),
+                start: self.start + 0.5 * which as f64 * self.length,
+                slack,
                 first,
                 second,
                 // What holds for all of the cell holds for its halves.
                 ..*self
             }
         };
-        Some([half(0), half(2)])
+        Some([half(0), half(1)])
     }
 
     /// Whether the motors move in proportion to the parameter, so that any even acceleration on it is even in the motors.
@@ -271,11 +277,27 @@ impl Lifter<'_> {
                 pen_speed: most(|rates| rates.pen_speed),
                 bend: most(|rates| rates.bend),
                 near_turn: piece.near_turn,
-                // A parabola through three samples leaves the straight lines between them by a quarter of its bulge.
-                slack: 0.5 * bulge,
+                slack: self.slack(piece, &a, &middle, &b)?,
             });
         }
         Ok(())
+    }
+
+    /// By how much the derivatives leave the straight lines between the three samples, looked at half way.
+    fn slack(&self, piece: &Piece, a: &Sample, middle: &Sample, b: &Sample) -> Result<f64, OutOfReach> {
+        let even = matches!(self.machine.geometry(), Geometry::Cartesian(_));
+        if even && piece.curve.third_derivative(0.0) == Vec2::ZERO {
+            return Ok(0.0);
+        }
+        let mut slack = 0.0_f64;
+        for (from, to) in [(a, middle), (middle, b)] {
+            let half_way = self.sample(piece, 0.5 * (from.s + to.s), from.pose)?.rates;
+            let first = [from.rates.first, half_way.first, to.rates.first];
+            let second = [from.rates.second, half_way.second, to.rates.second];
+            slack =
+                slack.max(bulge(self.machine, from.rates.pen_speed.max(to.rates.pen_speed), &first, &second));
+        }
+        Ok(1.2 * slack)
     }
 
     /// The most that a joint turns from one sample to the other, rad.

@@ -21,6 +21,8 @@ pub struct Settings {
     pub park: Option<Joints>,
     /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
     pub pen_speeds: Vec<(Pen, f64)>,
+    /// For how much of the time that a lift takes the motors may already travel, s.
+    pub lift_overlap: f64,
     /// How the pen speeds up and slows down over the paper. Travel is always as fast as the motors can.
     pub law: Law,
 }
@@ -45,7 +47,14 @@ pub enum Law {
 impl Settings {
     /// Time-optimal, parked at the start pose, all pens as fast as the machine's pen may be.
     pub fn new(tolerance: f64, period_us: u64) -> Self {
-        Self { tolerance, period_us, park: None, pen_speeds: Vec::new(), law: Law::TimeOptimal }
+        Self {
+            tolerance,
+            period_us,
+            park: None,
+            pen_speeds: Vec::new(),
+            lift_overlap: 0.0,
+            law: Law::TimeOptimal,
+        }
     }
 
     /// How fast a pen may go over the paper, mm/s.
@@ -120,6 +129,10 @@ pub(crate) fn check(settings: &Settings) -> Result<(), PlanError> {
     setting((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")?;
     let speeds = settings.pen_speeds.iter().all(|(_, speed)| *speed > 0.0 && speed.is_finite());
     setting(speeds, "a pen's speed must be a positive number of mm/s")?;
+    setting(
+        (0.0..=3600.0).contains(&settings.lift_overlap),
+        "the overlap of lifts must be between 0 and an hour",
+    )?;
     let Law::Eased { segment_time, .. } = settings.law else { return Ok(()) };
     setting((1e-6..=3600.0).contains(&segment_time), "the time of a segment must be between 1 us and an hour")
 }

@@ -211,6 +211,7 @@ impl Trajectory<'_> {
             guess: self.machine.start(),
             here: self.machine.start(),
             queue: VecDeque::new(),
+            is_down: false,
             parked: false,
         }
     }
@@ -230,6 +231,8 @@ struct Legs<'a> {
     /// Where it is after all legs so far.
     here: Joints,
     queue: VecDeque<Leg>,
+    /// Whether the pen has still to be lifted after all legs so far.
+    is_down: bool,
     parked: bool,
 }
 
@@ -270,19 +273,27 @@ impl Legs<'_> {
             self.queue.push_back(Leg::Pen { pen: 0, periods: 1 });
         }
         let pen = self.planner.machine.pen();
-        let periods = |dwell: f64| whole_periods(dwell, self.planner.period());
         // A dot is nothing but its dwell: without any there would be no ink in the plan.
-        let dwell = periods(pen.drop_time).max(u64::from(drawn.moves.is_empty()));
-        let lift = periods(pen.lift_time);
+        let dwell =
+            whole_periods(pen.drop_time, self.planner.period()).max(u64::from(drawn.moves.is_empty()));
         self.queue.push_back(Leg::Pen { pen: stroke.pen.0, periods: dwell });
         self.here = drawn.end();
         self.queue.extend(drawn.moves.into_iter().map(Leg::Move));
-        self.queue.push_back(Leg::Pen { pen: 0, periods: lift });
+        self.is_down = true;
         Ok(())
     }
 
+    /// Lifts the pen if it is down, and travels. Of the lift's time so much may be travelled as the settings allow, where
+    /// the way takes as long: the lift ends before the next drop begins.
     fn travel(&mut self, to: Joints) {
-        self.queue.extend(self.planner.travel(self.here, to).map(Leg::Move));
+        let way = self.planner.travel(self.here, to);
+        if std::mem::take(&mut self.is_down) {
+            let whole = whole_periods(self.planner.machine.pen().lift_time, self.planner.period());
+            let overlap = (self.planner.settings.lift_overlap / self.planner.period() + 1e-9).floor() as u64;
+            let overlap = overlap.min(way.as_ref().map_or(0, |way| way.periods));
+            self.queue.push_back(Leg::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
+        }
+        self.queue.extend(way.map(Leg::Move));
         self.here = to;
     }
 

@@ -3,7 +3,7 @@
 use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Joints, Machine};
 use planner::placement::{Size, Wish, place};
-use planner::{ExactRow, PlanError, Settings, plan};
+use planner::{Ease, ExactRow, Law, PlanError, Settings, plan};
 use proptest::prelude::*;
 
 mod machines;
@@ -214,6 +214,29 @@ fn the_pen_rests_for_the_whole_of_every_lift_and_drop() {
 }
 
 #[test]
+fn travel_may_begin_before_a_lift_ends_and_never_ends_before_it() {
+    let machine = machines::corexy();
+    // The second stroke begins where the first one ends: there is nothing to travel meanwhile.
+    let strokes =
+        [line(&[(50.0, 20.0), (60.0, 20.0)]), line(&[(60.0, 20.0), (60.0, 30.0)]), line(&[(90.0, 30.0)])];
+    let drawing = Drawing { strokes: strokes.into_iter().flat_map(|drawing| drawing.strokes).collect() };
+    let overlapping = Settings { lift_overlap: 0.06, ..settings() };
+    let waits = |settings: &Settings| -> Vec<u64> {
+        let rows: Vec<ExactRow> = plan(&machine, drawing.clone(), settings).unwrap().rows().collect();
+        let lifted = rows.windows(2).enumerate().filter(|(_, w)| w[0].row.pen > 0 && w[1].row.pen == 0);
+        let wait = |(index, _): (usize, &[ExactRow])| {
+            let here = rows[index + 1].row;
+            let moves = rows[index + 1..].iter().find(|row| row.row.ticks != here.ticks || row.row.pen != 0);
+            moves.unwrap_or(&rows[rows.len() - 1]).row.t_us - here.t_us
+        };
+        lifted.map(wait).collect()
+    };
+    // The last row at which the motors still stand is the one before they are seen to have moved.
+    assert_eq!(waits(&settings()), [120_000, 130_000, 130_000]);
+    assert_eq!(waits(&overlapping), [120_000, 70_000, 70_000]);
+}
+
+#[test]
 fn a_dot_is_a_pen_that_goes_down_and_up() {
     let machine = machines::corexy();
     let trajectory = plan(&machine, line(&[(50.0, 20.0)]), &settings()).unwrap();
@@ -312,4 +335,34 @@ fn fitting_lays_an_arch_around_the_hole() {
     let drawing = Drawing { strokes: vec![arch] };
     let width = fitted(&machine, &drawing).bounding_box().unwrap().width();
     assert!(width > 275.0 && width <= 276.0 + 1e-6, "{width}");
+}
+
+#[test]
+fn laws_with_a_given_time_give_it_to_every_piece() {
+    let machine = machines::corexy();
+    let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0), (10.0, 10.0)]);
+    for ease in [Ease::Linear, Ease::SineOut, Ease::QuadraticInOut] {
+        let law = Law::Eased { ease, segment_time: 0.504 };
+        let trajectory = plan(&machine, drawing.clone(), &Settings { law, ..settings() }).unwrap();
+        assert!((trajectory.times().drawing - 3.0 * 0.5).abs() < 1e-9);
+        // Half way in time: x, sin(pi / 4) and a half.
+        let down = trajectory.rows().position(|row| row.row.pen == 1).unwrap();
+        let share = match ease {
+            Ease::SineOut => std::f64::consts::FRAC_1_SQRT_2,
+            Ease::Linear | Ease::QuadraticInOut => 0.5,
+        };
+        let middle = trajectory.rows().nth(down + 1 + 25).unwrap();
+        let at = machine.pen_at(&Joints::from(middle.exact));
+        assert!((at.x - (10.0 + 50.0 * share)).abs() < 1e-9, "{ease:?} at {at}");
+    }
+}
+
+#[test]
+fn a_trapezoid_rests_at_every_vertex() {
+    let machine = machines::corexy();
+    let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0)]);
+    let exact = plan(&machine, drawing.clone(), &Settings { law: Law::Trapezoid, ..settings() }).unwrap();
+    let corner = machine.ticks(&Joints::new(60.0, 10.0));
+    assert!(exact.rows().any(|row| row.exact == [corner.x, corner.y]));
+    assert!(exact.times().drawing > plan(&machine, drawing, &settings()).unwrap().times().drawing);
 }

@@ -149,6 +149,9 @@ pub(crate) struct Planning {
     /// Whose speed the pen draws at
     #[arg(long, value_enum, default_value_t = Speed::Machine)]
     pub(crate) speed: Speed,
+    /// Begin to travel when the pen is half way up, not only when it is all the way up
+    #[arg(long)]
+    pub(crate) overlap_lifts: bool,
     /// How the pen speeds up and slows down over the paper
     #[arg(long, value_enum, default_value_t = Law::TimeOptimal)]
     pub(crate) law: Law,

@@ -105,6 +105,8 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
         order,
         wish: Wish { rotate: planning.rotate.unwrap_or(0.0).to_radians(), size },
         pen_speeds,
+        // The pen is off the paper long before it is all the way up.
+        lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time } else { 0.0 },
         law: law(planning),
         allow_over_limit: planning.allow_over_limit,
     }

@@ -40,6 +40,8 @@ pub struct Request {
     pub wish: Wish,
     /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
     pub pen_speeds: Vec<(Pen, f64)>,
+    /// For how much of the time that a lift takes the motors may already travel, s.
+    pub lift_overlap_s: f64,
     /// How speed goes along the strokes.
     pub law: Law,
     /// Whether the motors' limits may be broken, as some laws do: the certificate says so, and the plan is written.
@@ -143,6 +145,7 @@ pub fn compile<'a>(
     let settings = Settings {
         pen_speeds: request.pen_speeds.clone(),
         law: request.law,
+        lift_overlap: request.lift_overlap_s,
         ..Settings::new(request.tolerance_mm, request.period_us)
     };
     let trajectory = planner::plan(machine, ordered, &settings)?;
@@ -160,6 +163,7 @@ pub fn compile<'a>(
         }),
         placement: placement.as_coeffs(),
         period_us: request.period_us,
+        lift_overlap_us: (request.lift_overlap_s * 1e6).round() as u64,
         rows: trajectory.row_count(),
         duration_us: trajectory.duration_us(),
     };

@@ -58,6 +58,8 @@ pub struct Verifier<'a> {
     rows: u64,
     previous: Option<Previous>,
     event: Option<PenEvent>,
+    /// For how much of a lift's time the header lets the motors travel.
+    lift_overlap_us: u64,
     pens: Vec<u16>,
     follows: bool,
     after: Trace,
@@ -127,6 +129,7 @@ impl<'a> Verifier<'a> {
             rows: 0,
             previous: None,
             event: None,
+            lift_overlap_us: header.lift_overlap_us,
             pens: Vec::new(),
             follows,
             after: Trace::new(&target, scale, machine.tick_floor(&machine.start()), follows),
@@ -333,7 +336,9 @@ impl<'a> Verifier<'a> {
             _ => (PenMotion::Change, lift.lift_time + lift.drop_time),
         };
         // A planner may have cut the time to whole microseconds; 150000 must not become 150001 by a rounding error.
-        let until_us = t_us.saturating_add((time_s * 1e6 + 1e-3).floor() as u64);
+        let time_us = (time_s * 1e6 + 1e-3).floor() as u64;
+        let overlap_us = if motion == PenMotion::Lift { self.lift_overlap_us } else { 0 };
+        let until_us = t_us.saturating_add(time_us.saturating_sub(overlap_us));
         self.event = Some(PenEvent { motion, pen: if pen == 0 { before } else { pen }, until_us });
         self.lift();
         if pen == 0 {

@@ -308,6 +308,7 @@ fn emission_seconds(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f6
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: PERIOD_US,
         rows: trajectory.row_count(),
+        lift_overlap_us: 0,
         duration_us: trajectory.duration_us(),
     };
     let rows = || trajectory.rows().map(|row| row.row);

@@ -34,7 +34,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     let coarse = Law::of(machine, path, cap);
     let mut profile = Profile::new();
     let mut window = Law::default();
-    let (mut from, mut speed) = (0, 0.0);
+    let (mut from, mut speed, mut slower) = (0, 0.0, 1.0_f64);
     while from < path.cells.len() {
         let to = coarse.window_end(from + WINDOW);
         window.cells.clear();
@@ -42,17 +42,19 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
         window.sweep(speed, coarse.nodes[to]);
         window.refine(machine, &path.course, cap);
         speed = window.nodes[window.order.len()];
+        slower = slower.max(window.excess(machine).sqrt());
         window.emit(&mut profile);
         from = to;
     }
-    profile
+    profile.slowed(slower)
 }
 
 /// With no more cells than the path has, but for such as begin and end at rest.
 pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     let mut profile = Profile::new();
-    Law::of(machine, path, cap).emit(&mut profile);
-    profile
+    let law = Law::of(machine, path, cap);
+    law.emit(&mut profile);
+    profile.slowed(law.excess(machine).sqrt())
 }
 
 /// A cell with its conditions.
@@ -167,6 +169,27 @@ impl Law {
             cuts.push(idle.max(u32::from(hangs)));
         }
         (!time.is_finite() || hanging || cost > IDLE_COST * time).then_some(cuts)
+    }
+
+    /// How many times its limit a motor's acceleration may be between the places where it was held to it, at least 1.
+    ///
+    /// With m'' and b linear between them, `m' u + m'' b` is a parabola: its distance from a straight line is largest half
+    /// way. That is a few millionths as a rule; the motion is made slower by as much.
+    fn excess(&self, machine: &Machine) -> f64 {
+        let mut excess = 1.0_f64;
+        for (Held { cell, .. }, from, to) in self.runs() {
+            let u = 0.5 * (to - from) / cell.length;
+            for (half, share) in [0.25, 0.75].into_iter().enumerate() {
+                let b = from + share * (to - from);
+                let first = 0.5 * (cell.first[half] + cell.first[half + 1]);
+                let second = 0.5 * (cell.second[half] + cell.second[half + 1]);
+                for (k, motor) in machine.motors().iter().enumerate() {
+                    let acceleration = (first[k] * u + second[k] * b).abs();
+                    excess = excess.max(acceleration * (1.0 + cell.slack) / motor.max_acceleration);
+                }
+            }
+        }
+        excess
     }
 
     fn emit(&self, profile: &mut Profile) {

@@ -6,9 +6,8 @@
 //! speed         |m'| sqrt(b)     <= v      so  b <= (v / |m'|)²
 //! acceleration  |m' u + m'' b|   <= a      linear in (u, b)
 //! ```
-//! On a cell `u` is constant, so b is linear in s; where m' and m'' are linear too, `m' u + m'' b` is convex or concave
-//! enough that its bounds at the cell's start, middle and end hold between them (what is left is the cell's
-//! [`Cell::slack`], by which the limits are lowered). With `b(f) = b + 2 f length u` at the share f of the cell that is
+//! On a cell `u` is constant, so b is linear in s. The conditions are held at the cell's start, middle and end; by what m' and
+//! m'' may leave straight lines between those (the cell's [`Cell::slack`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the cell that is
 //! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
 //! two more near turns, where rows would cut them (see `path::zones`).
 //!

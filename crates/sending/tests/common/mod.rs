@@ -67,6 +67,7 @@ pub fn plan(strokes: &[(u16, &[[i64; 2]])]) -> TickTable {
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: PERIOD_US,
         rows: rows.len() as u64,
+        lift_overlap_us: 0,
         duration_us: rows.last().unwrap().t_us,
     };
     TickTable { header, rows }

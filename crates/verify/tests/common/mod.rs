@@ -63,6 +63,7 @@ pub fn header(machine: &Machine) -> Header {
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: PERIOD_US,
         rows: 0,
+        lift_overlap_us: 0,
         duration_us: 0,
     }
 }
