@@ -58,8 +58,20 @@ impl TwoLink {
         let factors = (farthest - r) * (farthest + r) * (r - nearest) * (r + nearest);
         let size = factors.max(0.0).sqrt() / (2.0 * l1 * l2);
         let sin = if elbow_left { -size } else { size };
-        let theta = libm::atan2(p.y, p.x) - libm::atan2(l2 * sin, l1 + l2 * cos);
-        Ok(Joints::new(theta, theta + libm::atan2(sin, cos)))
+        // theta is the direction of p less that of (a, b), psi that from the elbow to p: two arcs, where the formula has three.
+        let (a, b) = (l1 + l2 * cos, l2 * sin);
+        let first = Vec2::new(p.x * a + p.y * b, p.y * a - p.x * b);
+        let elbow = l1 / first.hypot2().sqrt() * first;
+        let theta = libm::atan2(first.y, first.x);
+        let psi = libm::atan2(p.y - elbow.y, p.x - elbow.x);
+        // The fold is on the elbow's side.
+        let turn = std::f64::consts::TAU;
+        let psi = match (elbow_left, psi > theta) {
+            (true, true) => psi - turn,
+            (false, false) => psi + turn,
+            _ => psi,
+        };
+        Ok(Joints::new(theta, psi))
     }
 
     pub(super) fn jacobian(self, q: &Joints) -> Matrix2<f64> {
