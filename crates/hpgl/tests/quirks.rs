@@ -612,7 +612,7 @@ fn absurd_numbers_are_told() {
     }
 }
 
-/// AutoCAD's driver numbers its colours from 0 on; a file of its lost a good part of its ink.
+/// `AutoCAD`'s driver numbers its colours from 0 on; a file of its lost a good part of its ink.
 #[test]
 fn pen_zero_with_a_colour_draws() {
     let palette = b"BPIN;NP8;PC0,0,255,255;SP0;PU0,0;PD400,0;SP1;PU0,40;PD400,40;PU;";
