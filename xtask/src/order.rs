@@ -35,6 +35,7 @@ pub(crate) fn bench(generator: &Path) -> Result<bool> {
         "the generator failed:\n{}",
         String::from_utf8_lossy(&made.stderr)
     );
+    let binary = crate::corpus::build()?;
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let mut met = true;
     for (name, target, vpype, lkh) in REFERENCES {
@@ -48,9 +49,32 @@ pub(crate) fn bench(generator: &Path) -> Result<bool> {
         let said = String::from_utf8_lossy(&run.stdout).trim().to_owned();
         let shown = |known: Option<f64>| known.map_or("-".into(), |mm| format!("{mm}"));
         println!("{said}\n    target {target}, vpype --two-opt {}, LKH {}", shown(vpype), shown(lkh));
+        // It takes minutes for 100,000 strokes.
+        if !name.ends_with("100k")
+            && let Some((mm, seconds)) = self::vpype(&binary, &work.path().join(format!("{name}.hpgl")))
+        {
+            println!("    vpype --two-opt on this machine: {mm:.1} mm in {seconds:.1} s");
+        }
         met &= travel_of(&said).is_some_and(|mm| mm <= target);
     }
     Ok(met)
+}
+
+/// vpype's own travel (mm) and how long it takes (s); nothing where it is not installed. Its lengths are in CSS pixels.
+fn vpype(plotplan: &Path, drawing: &Path) -> Option<(f64, f64)> {
+    let svg = drawing.with_extension("svg");
+    let made =
+        Command::new(plotplan).arg("convert").arg(drawing).args(["--format", "svg", "-o"]).arg(&svg).output();
+    if !made.ok()?.status.success() {
+        return None;
+    }
+    let started = std::time::Instant::now();
+    let run =
+        Command::new("vpype").arg("read").arg(&svg).args(["linesort", "--two-opt", "stat"]).output().ok()?;
+    let seconds = started.elapsed().as_secs_f64();
+    let said = String::from_utf8_lossy(&run.stdout);
+    let pixels = said.lines().rev().find_map(|line| line.trim().strip_prefix("Pen-up length:"))?;
+    Some((pixels.trim().parse::<f64>().ok()? * 25.4 / 96.0, seconds))
 }
 
 /// The last of the numbers followed by "mm" in what the example says.
