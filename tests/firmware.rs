@@ -87,7 +87,7 @@ fn ruler(geometry: Geometry) -> Machine {
         min_dexterity: 0.0,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: [motor("a", first), motor("b", FINE)],
-        pen: PenLift { max_speed: 1e9, lift_time: 0.0, drop_time: 0.0 },
+        pen: PenLift { max_speed: 1e9, max_travel_speed: f64::INFINITY, lift_time: 0.0, drop_time: 0.0 },
         sheet: Rect::new(0.0, 0.0, 1.0, 1.0),
         start: Joints::new(0.5, 100.0),
         period: 0.01,

@@ -41,6 +41,8 @@ pub struct Motor {
 pub struct PenLift {
     /// Largest speed of the pen over the paper while it draws, mm/s.
     pub max_speed: f64,
+    /// Largest speed of the pen while it travels, mm/s; infinite where only the motors limit it.
+    pub max_travel_speed: f64,
     /// How long lifting takes, s: the motors stand still.
     pub lift_time: f64,
     /// How long lowering takes, s: the motors stand still.
@@ -143,6 +145,8 @@ impl Machine {
         }
         require(parts.motors[0].name != parts.motors[1].name, "both motors have the same name")?;
         positive("the pen's max_speed", parts.pen.max_speed)?;
+        let travel = parts.pen.max_travel_speed;
+        require(travel > 0.0, "the pen's max_travel_speed must be a positive number")?;
         for (what, time) in [("lift_time", parts.pen.lift_time), ("drop_time", parts.pen.drop_time)] {
             require(
                 (0.0..=3600.0).contains(&time),

@@ -19,7 +19,7 @@ fn machine(geometry: Geometry, coupling: [[f64; 2]; 2], counts: [f64; 2], start:
         min_dexterity: 0.1,
         coupling,
         motors: [motor("a", counts[0], 3.0), motor("b", counts[1], -7.0)],
-        pen: PenLift { max_speed: 50.0, lift_time: 0.1, drop_time: 0.1 },
+        pen: PenLift { max_speed: 50.0, max_travel_speed: f64::INFINITY, lift_time: 0.1, drop_time: 0.1 },
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start,
         period: 0.01,

@@ -87,6 +87,7 @@ impl JointPath {
     /// The straight way in joint space, along which all motors start and stop together. Nothing if there is no way to go.
     pub fn travel(machine: &Machine, from: Joints, to: Joints) -> Option<Self> {
         let change = machine.motor_rates(&(to - from));
+        let pen_speed = travel_speed(machine, from, to);
         (change.amax() > 0.0).then(|| Self {
             course: Course::Travel(from, to),
             cells: vec![Cell {
@@ -95,7 +96,7 @@ impl JointPath {
                 start: 0.0,
                 first: [change; 3],
                 second: [Vector2::zeros(); 3],
-                pen_speed: 0.0,
+                pen_speed,
                 bend: 0.0,
                 near_turn: false,
                 slack: 0.0,
@@ -324,6 +325,24 @@ impl Lifter<'_> {
         }
         Ok(Sample { s, point, pose, rates: Rates::of(self.machine, piece, t, &pose) })
     }
+}
+
+/// A bound on |dp/ds| of the pen while the joints go straight from one pose to the other in s from 0 to 1, mm; 0 where no
+/// machine asks for it.
+///
+/// The way in `n` parts: `|dp/ds|` changes by `B` at the most over all of it, so by `B / n` between a part's ends, where B
+/// bounds the second derivative.
+pub(crate) fn travel_speed(machine: &Machine, from: Joints, to: Joints) -> f64 {
+    const PARTS: u32 = 16;
+    if machine.pen().max_travel_speed == f64::INFINITY {
+        return 0.0;
+    }
+    let geometry = machine.geometry();
+    let change = to - from;
+    let speed =
+        |k: u32| (geometry.jacobian(&(from + f64::from(k) / f64::from(PARTS) * change)) * change).norm();
+    let fastest = (0..=PARTS).map(speed).fold(0.0, f64::max);
+    fastest + 0.5 * geometry.bend(&from, &to) / f64::from(PARTS)
 }
 
 /// First and second derivatives of the motors by `s`, at a piece's own parameter `t`, where the pose is `pose`.

@@ -139,7 +139,7 @@ impl StrokePlanner<'_> {
     /// The way with the pen up from pose to pose; nothing where there is none.
     pub(crate) fn travel(&self, from: Joints, to: Joints) -> Option<Move> {
         let path = JointPath::travel(self.machine, from, to)?;
-        Some(self.movement(path, to, f64::INFINITY))
+        Some(self.movement(path, to, self.machine.pen().max_travel_speed))
     }
 
     /// Time between rows, s.

@@ -3,6 +3,8 @@
 use drawing::Point;
 use kinematics::{Joints, Machine};
 
+use crate::lift::travel_speed;
+
 /// The pose in which the pen is taken to be at a point when travel is compared: that nearest to the start pose. Nothing
 /// where the point is out of reach.
 pub fn travel_pose(machine: &Machine, point: Point) -> Option<Joints> {
@@ -21,7 +23,8 @@ pub fn travel_time(machine: &Machine, from: &Joints, to: &Joints) -> f64 {
 /// The trapezoid's time from pose to pose, s.
 fn joint_time(machine: &Machine, from: &Joints, to: &Joints) -> f64 {
     let change = machine.motor_rates(&(to - from));
-    let (mut speed, mut acceleration) = (f64::INFINITY, f64::INFINITY);
+    let pen = machine.pen().max_travel_speed / travel_speed(machine, *from, *to);
+    let (mut speed, mut acceleration) = (pen, f64::INFINITY);
     for (k, motor) in machine.motors().iter().enumerate() {
         let way = change[k].abs();
         if way > 0.0 {
@@ -29,7 +32,7 @@ fn joint_time(machine: &Machine, from: &Joints, to: &Joints) -> f64 {
             acceleration = acceleration.min(motor.max_acceleration / way);
         }
     }
-    if speed == f64::INFINITY {
+    if acceleration == f64::INFINITY {
         0.0
     } else if speed * speed >= acceleration {
         2.0 / acceleration.sqrt()

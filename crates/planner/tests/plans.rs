@@ -368,3 +368,25 @@ fn a_trapezoid_rests_at_every_vertex() {
     assert!(exact.rows().any(|row| row.exact == [corner.x, corner.y]));
     assert!(exact.times().drawing > plan(&machine, drawing, &settings()).unwrap().times().drawing);
 }
+
+#[test]
+fn travel_keeps_to_the_pens_travel_speed() {
+    for plain in [machines::arm(), machines::polar(), machines::corexy()] {
+        for machine in [plain.clone(), machines::with_jerk(&plain, 0.05)] {
+            let mut parts = machine.parts().clone();
+            parts.pen.max_travel_speed = 20.0;
+            let slow = Machine::new(parts).unwrap();
+            let drawing = line(&[(40.0, 100.0)]);
+            let times = [&machine, &slow].map(|machine| {
+                let trajectory = plan(machine, drawing.clone(), &settings()).unwrap();
+                let points: Vec<Point> =
+                    trajectory.rows().map(|row| machine.pen_at(&Joints::from(row.exact))).collect();
+                let steps = points.windows(2).map(|w| (w[1] - w[0]).hypot2().sqrt());
+                (trajectory.times().travel, steps.fold(0.0, f64::max) / 0.01)
+            });
+            let [(fast, most), (time, speed)] = times;
+            assert!(most > 25.0 && time > fast, "{most} mm/s, {fast} s and {time} s");
+            assert!(speed <= 20.0 * (1.0 + 1e-9) && speed > 18.0, "{} mm/s on {}", speed, machine.name());
+        }
+    }
+}

@@ -185,6 +185,8 @@ struct MotorTable {
 #[serde(deny_unknown_fields)]
 struct PenTable {
     max_speed: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    max_travel_speed: Option<String>,
     lift_time: String,
     drop_time: String,
 }
@@ -309,6 +311,10 @@ impl MachineFile {
             motors: [first.motor()?, second.motor()?],
             pen: PenLift {
                 max_speed: quantity::speed_mm_s(&self.pen.max_speed).map_err(at("pen.max_speed".into()))?,
+                max_travel_speed: match &self.pen.max_travel_speed {
+                    Some(speed) => quantity::speed_mm_s(speed).map_err(at("pen.max_travel_speed".into()))?,
+                    None => f64::INFINITY,
+                },
                 lift_time: time(&self.pen.lift_time, "pen.lift_time")?,
                 drop_time: time(&self.pen.drop_time, "pen.drop_time")?,
             },

@@ -134,10 +134,11 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
     }
     let _ = writeln!(
         text,
-        "\ntime {}: drawing {}, travel {}, pen lifts and drops {}",
+        "\ntime {}: drawing {}, travel {} ({}), pen lifts and drops {}",
         clock(compiled.header.duration_us as f64 * 1e-6),
         clock(times.drawing),
         clock(times.travel),
+        metres(certificate.travel_mm),
         clock(times.lifting)
     );
     text.push_str(&limited_by_text(compiled));

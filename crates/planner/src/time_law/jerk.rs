@@ -49,7 +49,7 @@ pub(super) fn applies(machine: &Machine) -> bool {
 /// The law on a path.
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     match &path.course {
-        Course::Travel(..) => straight(machine, path.cells[0].first[0]),
+        Course::Travel(..) => straight(machine, path.cells[0].first[0], cap.pen / path.cells[0].pen_speed),
         Course::Drawn(_, section) => {
             let fastest = acceleration::profile(machine, path, cap);
             let mut cells = cells(machine, path, section, cap, &fastest);
@@ -711,11 +711,11 @@ fn duration(length: f64, from: State, to: State, w: f64) -> f64 {
     }
 }
 
-/// A straight way in joint space: even jerk up to the largest acceleration, and so on, both halves alike.
-fn straight(machine: &Machine, change: Vector2<f64>) -> Profile {
+/// A straight way in joint space, no faster than `fastest`: even jerk up to the largest acceleration, and so on, both halves alike.
+fn straight(machine: &Machine, change: Vector2<f64>, fastest: f64) -> Profile {
     let least = |of: &dyn Fn(usize) -> f64| of(0).min(of(1));
     let motors = machine.motors();
-    let v = least(&|k| motors[k].max_speed / change[k].abs());
+    let v = least(&|k| motors[k].max_speed / change[k].abs()).min(fastest);
     let a = least(&|k| motors[k].max_acceleration / change[k].abs());
     let j = least(&|k| motors[k].max_jerk.unwrap_or(f64::INFINITY) / change[k].abs());
     // The time to reach the speed V is V/a + a/j, or 2 √(V/j) where a is not reached; the way from rest to rest without

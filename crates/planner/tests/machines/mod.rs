@@ -24,7 +24,7 @@ fn build(
         min_dexterity: if matches!(geometry, Geometry::TwoLink(_)) { 0.1 } else { 0.0 },
         coupling,
         motors,
-        pen: PenLift { max_speed: 60.0, lift_time: 0.12, drop_time: 0.15 },
+        pen: PenLift { max_speed: 60.0, max_travel_speed: f64::INFINITY, lift_time: 0.12, drop_time: 0.15 },
         sheet,
         start,
         period: 0.01,

@@ -22,7 +22,7 @@ fn parts(name: &str, geometry: Geometry, motors: [Motor; 2], start: Joints) -> M
         min_dexterity: 0.0,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors,
-        pen: PenLift { max_speed: 100.0, lift_time: 0.15, drop_time: 0.2 },
+        pen: PenLift { max_speed: 100.0, max_travel_speed: f64::INFINITY, lift_time: 0.15, drop_time: 0.2 },
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start,
         period: 0.01,
