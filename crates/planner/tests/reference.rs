@@ -262,7 +262,7 @@ fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
 
 /// Time of our law over all sections, s.
 fn ours(machine: &Machine, paths: &[JointPath], pen: f64) -> f64 {
-    let cap = SpeedCap { pen, row_deviation: f64::INFINITY, period: 0.01 };
+    let cap = SpeedCap { pen, row_deviation: f64::INFINITY, period: 1e-3 };
     paths.iter().map(|path| profile(machine, path, &cap).duration).sum()
 }
 

@@ -27,6 +27,9 @@ const LEAST_GAIN: f64 = 1e-4;
 /// A cell is not cut if its motors idle by less than this share of their limits.
 const IDLE: f64 = 2e-3;
 
+/// Cells that take less than this share of the time between rows are not cut: nobody would see where in it motors idle.
+const SHORTEST: f64 = 1.0 / 16.0;
+
 /// How often cells are cut in two.
 const ROUNDS: usize = 8;
 
@@ -125,7 +128,7 @@ impl Law {
         let mut time = self.time();
         let (mut order, mut nodes, mut finer) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
-            let Some(cuts) = self.cuts(time) else { break };
+            let Some(cuts) = self.cuts(time, SHORTEST * cap.period) else { break };
             order.clear();
             for (index, cuts) in self.order.iter().zip(cuts) {
                 finer.clear();
@@ -152,15 +155,21 @@ impl Law {
         }
     }
 
-    /// How often each cell is to be cut in two because its motors idle; nothing if that costs next to no `time`.
-    fn cuts(&self, time: f64) -> Option<Vec<u32>> {
+    /// How often each cell that takes longer than `shortest` is to be cut in two because its motors idle; nothing if that
+    /// costs next to no `time`.
+    fn cuts(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
         let mut cuts = Vec::with_capacity(self.order.len());
         let (mut cost, mut hanging) = (0.0, false);
         for (Held { bounds, cell }, from, to) in self.runs() {
+            let own_time = bounds.time(from, to);
+            if own_time < shortest {
+                cuts.push(0);
+                continue;
+            }
             // What the limits were lowered by for want of samples counts as idle too.
             let idleness = bounds.idleness(from, to) + cell.slack;
             // A motion with limits lower by a share takes longer by half of it.
-            cost += 0.5 * idleness * bounds.time(from, to);
+            cost += 0.5 * idleness * own_time;
             let hangs = bounds.hangs_on_speed(from, to);
             hanging |= hangs;
             // Half the length, half the idleness.
