@@ -153,9 +153,13 @@ fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -
         let park = if at == last { options.park } else { None };
         let mut strokes = search(strokes, start, park, cost, options, (options.effort, all));
         // Where closed strokes begin, they are reached elsewhere: another order may be better now.
-        if seam::choose_seams(&mut strokes, start, park, cost) {
+        let choose = |strokes: &mut [Stroke]| {
+            let turned = seam::turn_circles(strokes, start, park, cost);
+            seam::choose_seams(strokes, start, park, cost) || turned
+        };
+        if choose(&mut strokes) {
             strokes = search(strokes, start, park, cost, options, (options.effort.min(1), all));
-            seam::choose_seams(&mut strokes, start, park, cost);
+            choose(&mut strokes);
         }
         ordered.append(&mut strokes);
     }

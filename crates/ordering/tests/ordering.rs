@@ -307,3 +307,20 @@ fn a_cost_that_is_not_a_number_changes_nothing() {
     let (ordered, _) = optimize(Drawing { strokes: strokes.clone() }, &nan, &plain());
     assert_eq!(ordered.strokes, strokes);
 }
+
+/// A circle of one arc that begins on its far side.
+#[test]
+fn circles_begin_where_that_is_cheapest() {
+    let center = Point::new(100.0, 0.0);
+    let arc = EllipticArc::circular(center, 10.0, 0.0, std::f64::consts::TAU);
+    let mut circle = Stroke::new(Pen(1), arc.eval(0.0), Span { start: 7, end: 9 });
+    circle.arc(arc);
+    let options = Options { start: Some(Point::ZERO), park: Some(Point::ZERO), ..Options::default() };
+    let (ordered, report) = order(vec![circle], &options);
+    assert!((ordered[0].start().x - 90.0).abs() < 1e-9, "{}", ordered[0].start());
+    assert!((report.travel_mm_after - 180.0).abs() < 1e-6, "{}", report.travel_mm_after);
+    let segments: Vec<Segment> = ordered[0].segments().collect();
+    let [Segment::Arc(turned)] = segments[..] else { panic!("{segments:?}") };
+    assert_eq!((turned.center, turned.a, turned.b, turned.sweep), (arc.center, arc.a, arc.b, arc.sweep));
+    assert_eq!(ordered[0].source(), Span { start: 7, end: 9 });
+}

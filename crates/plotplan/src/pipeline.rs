@@ -1,6 +1,6 @@
 //! From a drawing to a certified plan: each room's work, one after the other.
 
-use drawing::{Affine, Drawing, Pen, Point, Rect};
+use drawing::{Affine, Drawing, Pen, Point, Rect, Segment};
 use kinematics::{Joints, Machine};
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
@@ -201,6 +201,13 @@ fn pieces_of(drawing: &Drawing) -> Vec<(u16, [[i64; 2]; 3])> {
             add(stroke.start(), stroke.start(), stroke.start());
         }
         for (ends, segment) in stroke.vertices().windows(2).zip(stroke.segments()) {
+            if let Segment::Arc(arc) = segment
+                && (arc.sweep.abs() - std::f64::consts::TAU).abs() < 1e-9
+            {
+                // A whole turn may begin anywhere.
+                add(arc.center + arc.a, arc.center - arc.a, arc.center + arc.b);
+                continue;
+            }
             add(ends[0], ends[1], segment.eval(0.5));
         }
     }
@@ -280,6 +287,18 @@ mod tests {
         let one = drawing(&[&[(0.0, 0.0), (1.0, 0.0)], &[(1.0, 0.0), (1.0, 2.0)], &[(5.0, 5.0)]]);
         let other = drawing(&[&[(5.0, 5.0)], &[(1.0, 2.0), (1.0, 0.0), (0.0, 0.0)]]);
         assert!(same_ink(&one, &other));
+    }
+
+    #[test]
+    fn a_whole_circle_may_begin_anywhere() {
+        let circle = |radius: f64, start: f64| {
+            let arc = EllipticArc::circular(Point::new(5.0, 5.0), radius, start, std::f64::consts::TAU);
+            let mut stroke = Stroke::new(Pen(1), arc.eval(0.0), Span::default());
+            stroke.arc(arc);
+            Drawing { strokes: vec![stroke] }
+        };
+        assert!(same_ink(&circle(2.0, 0.0), &circle(2.0, 1.0)));
+        assert!(!same_ink(&circle(2.0, 0.0), &circle(2.1, 0.0)));
     }
 
     #[test]
