@@ -64,13 +64,17 @@ const SHORTEST: f64 = 1e-5;
 
 /// The path's derivatives at one place.
 #[derive(Clone, Copy)]
-struct Rates {
-    first: Vector2<f64>,
-    second: Vector2<f64>,
-    pen_speed: f64,
+pub(crate) struct Rates {
+    /// Of the motors.
+    pub(crate) first: Vector2<f64>,
+    /// Likewise.
+    pub(crate) second: Vector2<f64>,
+    /// See [`Cell::pen_speed`].
+    pub(crate) pen_speed: f64,
     /// Curvature times speed², 1/mm.
     turning: f64,
-    bend: f64,
+    /// See [`Cell::bend`].
+    pub(crate) bend: f64,
 }
 
 /// The path and its derivatives at one place.
@@ -356,9 +360,17 @@ fn motor_derivatives(
     machine.motor_derivatives(pose, piece.rate * velocity, piece.rate * piece.rate * acceleration)
 }
 
+/// Third derivatives, likewise.
+pub(crate) fn third_derivative(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Vector2<f64> {
+    let rate = piece.rate;
+    let (first, second) = piece.curve.derivatives(t);
+    let third = rate * rate * rate * piece.curve.third_derivative(t);
+    machine.motor_third_derivative(pose, rate * first, rate * rate * second, third)
+}
+
 impl Rates {
     /// At the curve's own parameter `t`, where the pose is `pose`.
-    fn of(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Self {
+    pub(crate) fn of(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Self {
         let (velocity, acceleration) = piece.curve.derivatives(t);
         let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let pen_speed = velocity.hypot2().sqrt();

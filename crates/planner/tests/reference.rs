@@ -33,6 +33,9 @@ const BUDGET: Budget =
 /// By how much a profile may take longer than the best, as a share.
 const EXCESS: f64 = 0.002;
 
+/// The same with rows 10 ms apart, where cells are not cut as short.
+const COARSE_EXCESS: f64 = 0.005;
+
 /// The path and the motors at one place, from one side.
 #[derive(Clone, Copy)]
 struct Place {
@@ -261,8 +264,8 @@ fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
 }
 
 /// Time of our law over all sections, s.
-fn ours(machine: &Machine, paths: &[JointPath], pen: f64) -> f64 {
-    let cap = SpeedCap { pen, row_deviation: f64::INFINITY, period: 1e-3 };
+fn ours(machine: &Machine, paths: &[JointPath], pen: f64, period: f64) -> f64 {
+    let cap = SpeedCap { pen, row_deviation: f64::INFINITY, period };
     paths.iter().map(|path| profile(machine, path, &cap).duration).sum()
 }
 
@@ -311,7 +314,7 @@ fn profiles_are_near_the_best() {
     let machines = [("arm", machines::arm()), ("corexy", machines::corexy()), ("polar", machines::polar())];
     let mut wrong = Vec::new();
     println!(
-        "{:<8} {:<16} {:>6} {:>9} {:>9} {:>9}  ours/best",
+        "{:<8} {:<16} {:>6} {:>9} {:>9} {:>9}  ours/best   10 ms",
         "machine", "path", "pen", "below", "best", "ours"
     );
     for (name, machine) in &machines {
@@ -328,9 +331,13 @@ fn profiles_are_near_the_best() {
                     (coarse, fine) = (fine, program(parts));
                 }
                 let best = fine - (coarse - fine);
-                let (ours, below) = (ours(machine, &paths, pen), below(machine, &paths, pen, 64));
-                let excess = ours / best;
-                println!("{name:<8} {shape:<16} {pen:>6} {below:>9.5} {best:>9.5} {ours:>9.5}  {excess:.5}");
+                let below = below(machine, &paths, pen, 64);
+                let (coarse_rows, ours) =
+                    (ours(machine, &paths, pen, 1e-2), ours(machine, &paths, pen, 1e-3));
+                let (excess, coarse_excess) = (ours / best, coarse_rows / best);
+                println!(
+                    "{name:<8} {shape:<16} {pen:>6} {below:>9.5} {best:>9.5} {ours:>9.5}  {excess:.5} {coarse_excess:.5}"
+                );
                 let case = format!("{name}, {shape}, pen at {pen}: {below} <= {best} <= {ours}");
                 if below > ours * (1.0 + 1e-8) {
                     wrong.push(format!("impossible: {case}"));
@@ -338,8 +345,8 @@ fn profiles_are_near_the_best() {
                 if (below / best - 1.0).abs() > 2e-3 {
                     wrong.push(format!("the reference is off: {case}"));
                 }
-                if excess > 1.0 + EXCESS {
-                    wrong.push(format!("slow by {excess}: {case}"));
+                if excess > 1.0 + EXCESS || coarse_excess > 1.0 + COARSE_EXCESS {
+                    wrong.push(format!("slow by {excess} or {coarse_excess}: {case}"));
                 }
             }
         }
@@ -365,7 +372,7 @@ proptest! {
             points.push((at.x, at.y));
         }
         let paths = lifted(&machine, &polyline(&points));
-        let (ours, below) = (ours(&machine, &paths, 1000.0), below(&machine, &paths, 1000.0, 64));
+        let (ours, below) = (ours(&machine, &paths, 1000.0, 1e-2), below(&machine, &paths, 1000.0, 64));
         prop_assert!(below <= ours * (1.0 + 1e-8), "{} s is less than {} s, which is impossible", ours, below);
         prop_assert!(ours <= 1.05 * below, "{} s could perhaps be {} s", ours, below);
     }

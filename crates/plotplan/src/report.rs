@@ -149,7 +149,7 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
     if let Some(report) = &compiled.ordering {
         let _ = writeln!(
             text,
-            "pen up for {:.1} % of the time: travel {} instead of {} in the file's order, with lifts and drops {} instead of {}",
+            "pen up for {:.1} % of the time: {} straight from stroke to stroke instead of {} in the file's order, with lifts and drops {} instead of {}",
             100.0 * (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
             metres(report.travel_mm_after),
             metres(report.travel_mm_before),

@@ -383,16 +383,9 @@ impl Conversation for Asking {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            lines: self.taken as u64,
-            of_lines: self.steps.len() as u64,
-            done_us: self.steps[..self.taken].iter().map(|step| step.lasts_us).sum(),
-            of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
-            row: self.row(self.taken),
-            at_most: self.row(self.ever.max(self.taken)),
-            resent: self.resent,
-            asked: self.asked,
-        }
+        let known =
+            Progress::of(&self.steps, self.taken, self.row(self.taken), self.row(self.ever.max(self.taken)));
+        Progress { resent: self.resent, asked: self.asked, ..known }
     }
 
     fn outcome(&self) -> Option<&Outcome> {

@@ -1,5 +1,7 @@
 //! What all conversations have in common.
 
+use crate::script::Step;
+
 /// How far a conversation has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
@@ -19,6 +21,16 @@ pub struct Progress {
     pub resent: u64,
     /// Times that the machine was asked where it stands.
     pub asked: u64,
+}
+
+impl Progress {
+    /// With so many of the steps taken by the machine, which holds `row` then, and may at most have come to `at_most`.
+    pub(crate) fn of(steps: &[Step], taken: usize, row: u64, at_most: u64) -> Self {
+        let time = |steps: &[Step]| steps.iter().map(|step| step.lasts_us).sum();
+        let (lines, of_lines) = (taken as u64, steps.len() as u64);
+        let (done_us, of_us) = (time(&steps[..taken]), time(steps));
+        Self { lines, of_lines, done_us, of_us, row, at_most, resent: 0, asked: 0 }
+    }
 }
 
 /// How a conversation ended.

@@ -204,16 +204,8 @@ impl Conversation for Numbered {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            lines: self.taken as u64,
-            of_lines: self.steps.len() as u64,
-            done_us: self.steps[..self.taken].iter().map(|step| step.lasts_us).sum(),
-            of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
-            row: self.row(self.taken),
-            at_most: self.row(self.ever),
-            resent: self.resent,
-            asked: 0,
-        }
+        let known = Progress::of(&self.steps, self.taken, self.row(self.taken), self.row(self.ever));
+        Progress { resent: self.resent, ..known }
     }
 
     fn outcome(&self) -> Option<&Outcome> {

@@ -204,16 +204,13 @@ impl Conversation for Repeating {
     }
 
     fn progress(&self) -> Progress {
-        Progress {
-            lines: self.done as u64,
-            of_lines: self.steps.len() as u64,
-            done_us: self.steps[..self.done].iter().map(|step| step.lasts_us).sum(),
-            of_us: self.steps.iter().map(|step| step.lasts_us).sum(),
-            row: self.row(self.done),
-            at_most: self.row(self.steps.len().min(self.done + 1)),
-            resent: self.resent,
-            asked: 0,
-        }
+        let known = Progress::of(
+            &self.steps,
+            self.done,
+            self.row(self.done),
+            self.row(self.steps.len().min(self.done + 1)),
+        );
+        Progress { resent: self.resent, ..known }
     }
 
     fn outcome(&self) -> Option<&Outcome> {

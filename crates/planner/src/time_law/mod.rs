@@ -4,6 +4,8 @@ mod acceleration;
 mod bounds;
 mod eased;
 mod jerk;
+mod polygon;
+mod straight;
 
 use kinematics::Machine;
 

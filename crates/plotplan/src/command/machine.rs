@@ -42,7 +42,7 @@ fn check(file: &str) -> Result<String, Failure> {
     let joints = machine.geometry().joint_names();
     for (k, motor) in machine.motors().iter().enumerate() {
         let row = machine.coupling().matrix().row(k);
-        let _ = writeln!(
+        let _ = write!(
             text,
             "motor {}: {:.4} * ({} {} + {} {}) + {:.4} ticks, at most {:.1} ticks/s, {:.1} ticks/s2",
             motor.name,
@@ -55,6 +55,10 @@ fn check(file: &str) -> Result<String, Failure> {
             motor.max_speed,
             motor.max_acceleration
         );
+        if let Some(jerk) = motor.max_jerk {
+            let _ = write!(text, ", {jerk:.1} ticks/s3");
+        }
+        text.push('\n');
     }
     let start = machine.ticks(&machine.start());
     let _ = writeln!(text, "start at ticks {}, {}", start.x.round(), start.y.round());

@@ -6,8 +6,7 @@
 
 use std::collections::VecDeque;
 
-use super::Device;
-use crate::ink::Ink;
+use super::{Device, Port};
 
 /// Its receive buffer, bytes.
 const BUFFER: usize = 256;
@@ -29,32 +28,44 @@ enum Motion {
 }
 
 /// The board with its motors.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Ebb {
-    buffer: Vec<u8>,
+    port: Port,
     fifo: VecDeque<Motion>,
     until_us: Option<u64>,
-    answers: Vec<Vec<u8>>,
     accumulators: [i64; 2],
     /// Its global step counters, and how far the motors are from where they were switched on.
     counters: [i64; 2],
     place: [i64; 2],
     up_position: Option<i64>,
     down: bool,
-    ink: Ink,
-    lost: u64,
-    stalled_us: u64,
     now_us: u64,
+}
+
+impl Default for Ebb {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl Ebb {
     /// Switched on.
     pub fn new() -> Self {
-        Self::default()
+        Self {
+            port: Port::new(BUFFER),
+            fifo: VecDeque::new(),
+            until_us: None,
+            accumulators: [0; 2],
+            counters: [0; 2],
+            place: [0; 2],
+            up_position: None,
+            down: false,
+            now_us: 0,
+        }
     }
 
     fn ok(&mut self) {
-        self.answers.push(b"OK\r\n".to_vec());
+        self.port.answers.push(b"OK\r\n".to_vec());
     }
 
     /// Each thing at its time, up to `now_us`.
@@ -83,7 +94,7 @@ impl Ebb {
             Motion::Stepper { ms, .. } => ms * 1000,
             Motion::Pen { down, ms } => {
                 self.down = down;
-                self.ink.pen(u16::from(down), self.place.map(|steps| steps as f64));
+                self.port.ink.pen(u16::from(down), self.place.map(|steps| steps as f64));
                 ms * 1000
             }
         };
@@ -120,21 +131,21 @@ impl Ebb {
             self.counters[axis] += steps;
             self.place[axis] += steps;
         }
-        self.ink.go(self.place.map(|steps| steps as f64));
+        self.port.ink.go(self.place.map(|steps| steps as f64));
     }
 
     fn take(&mut self) -> bool {
-        if self.now_us < self.stalled_us {
+        if self.now_us < self.port.stalled_us {
             return false;
         }
-        let Some(end) = self.buffer.iter().position(|byte| *byte == b'\r') else { return false };
-        let line = String::from_utf8_lossy(&self.buffer[..end]).trim().to_owned();
+        let Some(end) = self.port.buffer.iter().position(|byte| *byte == b'\r') else { return false };
+        let line = String::from_utf8_lossy(&self.port.buffer[..end]).trim().to_owned();
         let motion = match motion(&line, self.up_position) {
             Ok(motion) => motion,
             Err(why) => {
-                self.buffer.drain(..=end);
+                self.port.buffer.drain(..=end);
                 if let Some(why) = why {
-                    self.answers.push(format!("!8 Err: {why}\r\n").into_bytes());
+                    self.port.answers.push(format!("!8 Err: {why}\r\n").into_bytes());
                 } else {
                     self.query(&line);
                 }
@@ -145,7 +156,7 @@ impl Ebb {
         if self.fifo.len() > FIFO {
             return false;
         }
-        self.buffer.drain(..=end);
+        self.port.buffer.drain(..=end);
         if let (Motion::Pen { .. }, Some(position)) = (motion, servo_position(&line)) {
             self.up_position.get_or_insert(position);
         }
@@ -158,11 +169,11 @@ impl Ebb {
         match line {
             "QM" => {
                 let moving = u8::from(!self.fifo.is_empty());
-                self.answers.push(format!("QM,{moving},{moving},{moving},0\r\n").into_bytes());
+                self.port.answers.push(format!("QM,{moving},{moving},{moving},0\r\n").into_bytes());
             }
             "QS" => {
                 let [a, b] = self.counters;
-                self.answers.push(format!("{a},{b}\r\n").into_bytes());
+                self.port.answers.push(format!("{a},{b}\r\n").into_bytes());
                 self.ok();
             }
             _ => {
@@ -218,45 +229,21 @@ fn motion(line: &str, up_position: Option<i64>) -> Result<Motion, Option<String>
 }
 
 impl Device for Ebb {
+    fn port(&self) -> &Port {
+        &self.port
+    }
+
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
+    }
+
     fn advance(&mut self, now_us: u64) {
         self.work(now_us);
     }
 
-    fn receive(&mut self, bytes: &[u8], now_us: u64) {
-        self.advance(now_us);
-        for &byte in bytes {
-            if self.buffer.len() < BUFFER {
-                self.buffer.push(byte);
-            } else {
-                self.lost += 1;
-            }
-        }
-        self.advance(now_us);
-    }
-
-    fn room(&self) -> usize {
-        BUFFER - self.buffer.len()
-    }
-
-    fn answers(&mut self) -> Vec<Vec<u8>> {
-        std::mem::take(&mut self.answers)
-    }
-
     fn wake_us(&self) -> Option<u64> {
-        let stalled = (self.stalled_us > self.now_us).then_some(self.stalled_us);
+        let stalled = (self.port.stalled_us > self.now_us).then_some(self.port.stalled_us);
         self.until_us.into_iter().chain(stalled).min()
-    }
-
-    fn ink(&self) -> &Ink {
-        &self.ink
-    }
-
-    fn lost_bytes(&self) -> u64 {
-        self.lost
-    }
-
-    fn stall(&mut self, until_us: u64) {
-        self.stalled_us = until_us;
     }
 
     fn pen_is_down(&self) -> bool {

@@ -5,8 +5,7 @@
 
 use std::collections::VecDeque;
 
-use super::Device;
-use crate::ink::Ink;
+use super::{Device, Port};
 
 /// Its receive buffer, bytes.
 const BUFFER: usize = 128;
@@ -28,13 +27,12 @@ struct Block {
 /// The machine.
 #[derive(Debug)]
 pub struct Grbl {
-    buffer: Vec<u8>,
+    port: Port,
     blocks: VecDeque<Block>,
     /// When the first block is done.
     until_us: Option<u64>,
     /// Until when a dwell keeps the next line from being read.
     dwell_us: u64,
-    answers: Vec<Vec<u8>>,
     place: [f64; 2],
     planned: [f64; 2],
     inverse: bool,
@@ -42,9 +40,6 @@ pub struct Grbl {
     motion: u8,
     up: Option<f64>,
     down: bool,
-    ink: Ink,
-    lost: u64,
-    stalled_us: u64,
     now_us: u64,
     /// At `M0`, until `~`.
     paused: bool,
@@ -59,12 +54,13 @@ impl Default for Grbl {
 impl Grbl {
     /// Switched on and homed at 0, 0.
     pub fn new() -> Self {
+        let mut port = Port::new(BUFFER);
+        port.answers.push(b"\r\nGrbl 1.1h ['$' for help]\r\n".to_vec());
         Self {
-            buffer: Vec::new(),
+            port,
             blocks: VecDeque::new(),
             until_us: None,
             dwell_us: 0,
-            answers: vec![b"\r\nGrbl 1.1h ['$' for help]\r\n".to_vec()],
             place: [0.0; 2],
             planned: [0.0; 2],
             inverse: false,
@@ -72,20 +68,17 @@ impl Grbl {
             motion: 0,
             up: None,
             down: false,
-            ink: Ink::default(),
-            lost: 0,
-            stalled_us: 0,
             now_us: 0,
             paused: false,
         }
     }
 
     fn answer(&mut self, text: &str) {
-        self.answers.push(format!("{text}\r\n").into_bytes());
+        self.port.answers.push(format!("{text}\r\n").into_bytes());
     }
 
     fn report(&mut self) {
-        let state = if self.now_us < self.stalled_us || self.paused {
+        let state = if self.now_us < self.port.stalled_us || self.paused {
             "Hold:0"
         } else if self.blocks.is_empty() && self.now_us >= self.dwell_us {
             "Idle"
@@ -110,7 +103,7 @@ impl Grbl {
                 self.until_us = None;
                 for point in self.blocks.pop_front().map_or_else(Vec::new, |block| block.points) {
                     self.place = point;
-                    self.ink.go(point);
+                    self.port.ink.go(point);
                 }
             }
         }
@@ -121,19 +114,19 @@ impl Grbl {
     fn take(&mut self) -> bool {
         if self.paused
             || self.now_us < self.dwell_us
-            || self.now_us < self.stalled_us
+            || self.now_us < self.port.stalled_us
             || self.blocks.len() >= BLOCKS
         {
             return false;
         }
-        let Some(end) = self.buffer.iter().position(|byte| *byte == b'\n') else { return false };
-        let line = String::from_utf8_lossy(&self.buffer[..end]).trim().to_owned();
+        let Some(end) = self.port.buffer.iter().position(|byte| *byte == b'\n') else { return false };
+        let line = String::from_utf8_lossy(&self.port.buffer[..end]).trim().to_owned();
         // Spindle, dwell and (here) the pen's axis wait until everything before them has been done.
         let waits = line.starts_with('M') || line.starts_with("G4") || line.contains('Z');
         if waits && !self.blocks.is_empty() {
             return false;
         }
-        self.buffer.drain(..=end);
+        self.port.buffer.drain(..=end);
         if line.split([' ', ';']).next() == Some("M0") {
             // The answer comes when it goes on.
             self.paused = true;
@@ -150,7 +143,7 @@ impl Grbl {
     fn set_pen(&mut self, value: f64) {
         let up = *self.up.get_or_insert(value);
         self.down = value != up;
-        self.ink.pen(u16::from(self.down), self.place);
+        self.port.ink.pen(u16::from(self.down), self.place);
     }
 
     fn follow(&mut self, line: &str) -> Result<(), u8> {
@@ -245,6 +238,14 @@ fn arc(from: [f64; 2], to: [f64; 2], center: [f64; 2], clockwise: bool) -> Resul
 }
 
 impl Device for Grbl {
+    fn port(&self) -> &Port {
+        &self.port
+    }
+
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
+    }
+
     fn advance(&mut self, now_us: u64) {
         self.work(now_us);
     }
@@ -260,36 +261,15 @@ impl Device for Grbl {
                     }
                 }
                 b'!' | 0x18 | b'\r' => {}
-                _ if self.buffer.len() >= BUFFER => self.lost += 1,
-                _ => self.buffer.push(byte),
+                _ => self.port.push(byte),
             }
         }
         self.advance(now_us);
     }
 
-    fn room(&self) -> usize {
-        BUFFER - self.buffer.len()
-    }
-
-    fn answers(&mut self) -> Vec<Vec<u8>> {
-        std::mem::take(&mut self.answers)
-    }
-
     fn wake_us(&self) -> Option<u64> {
         let later = |us: u64| (us > self.now_us).then_some(us);
-        self.until_us.into_iter().chain(later(self.dwell_us)).chain(later(self.stalled_us)).min()
-    }
-
-    fn ink(&self) -> &Ink {
-        &self.ink
-    }
-
-    fn lost_bytes(&self) -> u64 {
-        self.lost
-    }
-
-    fn stall(&mut self, until_us: u64) {
-        self.stalled_us = until_us;
+        self.until_us.into_iter().chain(later(self.dwell_us)).chain(later(self.port.stalled_us)).min()
     }
 
     fn pen_is_down(&self) -> bool {

@@ -3,9 +3,8 @@
 
 use std::collections::VecDeque;
 
-use super::Device;
+use super::{Device, Port};
 use crate::conversation::{framed, unframed};
-use crate::ink::Ink;
 
 /// Its receive buffer, bytes.
 const BUFFER: usize = 512;
@@ -22,11 +21,10 @@ enum Order {
 /// The machine.
 #[derive(Debug)]
 pub struct Ticks {
-    buffer: Vec<u8>,
+    port: Port,
     queue: VecDeque<Order>,
     /// When the first of the queue is done, once it has begun.
     until_us: Option<u64>,
-    answers: Vec<Vec<u8>>,
     next: usize,
     /// Where its motors are; unknown before the first sync line.
     position: Option<[i64; 2]>,
@@ -35,9 +33,6 @@ pub struct Ticks {
     moves: u64,
     clock_us: u64,
     pen: u16,
-    ink: Ink,
-    lost: u64,
-    stalled_us: u64,
     now_us: u64,
     complete: bool,
 }
@@ -46,19 +41,15 @@ impl Ticks {
     /// Homed at `position` where that is known.
     pub fn new(position: Option<[i64; 2]>) -> Self {
         Self {
-            buffer: Vec::new(),
+            port: Port::new(BUFFER),
             queue: VecDeque::new(),
             until_us: None,
-            answers: Vec::new(),
             next: 0,
             position,
             planned: position,
             moves: 0,
             clock_us: 0,
             pen: 0,
-            ink: Ink::default(),
-            lost: 0,
-            stalled_us: 0,
             now_us: 0,
             complete: false,
         }
@@ -70,13 +61,13 @@ impl Ticks {
     }
 
     fn answer(&mut self, text: &str) {
-        self.answers.push(format!("{text}\n").into_bytes());
+        self.port.answers.push(format!("{text}\n").into_bytes());
     }
 
     fn set_pen(&mut self, pen: u16) {
         self.pen = pen;
         let at = self.position.unwrap_or_default().map(|ticks| ticks as f64);
-        self.ink.pen(pen, at);
+        self.port.ink.pen(pen, at);
     }
 
     /// Each thing at its time, up to `now_us`.
@@ -89,7 +80,7 @@ impl Ticks {
                 self.until_us = None;
                 if let Some(Order::Move { to, .. }) = self.queue.pop_front() {
                     self.position = Some(to);
-                    self.ink.go(to.map(|ticks| ticks as f64));
+                    self.port.ink.go(to.map(|ticks| ticks as f64));
                 }
             }
         }
@@ -120,11 +111,11 @@ impl Ticks {
 
     /// Takes a line out of the buffer if there is room to queue what it says; whether it did.
     fn take(&mut self) -> bool {
-        if self.queue.len() >= QUEUE || self.now_us < self.stalled_us {
+        if self.queue.len() >= QUEUE || self.now_us < self.port.stalled_us {
             return false;
         }
-        let Some(end) = self.buffer.iter().position(|byte| *byte == b'\n') else { return false };
-        let line: Vec<u8> = self.buffer.drain(..=end).collect();
+        let Some(end) = self.port.buffer.iter().position(|byte| *byte == b'\n') else { return false };
+        let line: Vec<u8> = self.port.buffer.drain(..=end).collect();
         let line = String::from_utf8_lossy(&line).trim().to_owned();
         match unframed(&line) {
             Some(text) => self.numbered(text),
@@ -210,45 +201,21 @@ impl Ticks {
 }
 
 impl Device for Ticks {
+    fn port(&self) -> &Port {
+        &self.port
+    }
+
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
+    }
+
     fn advance(&mut self, now_us: u64) {
         self.work(now_us);
     }
 
-    fn receive(&mut self, bytes: &[u8], now_us: u64) {
-        self.advance(now_us);
-        for &byte in bytes {
-            if self.buffer.len() < BUFFER {
-                self.buffer.push(byte);
-            } else {
-                self.lost += 1;
-            }
-        }
-        self.advance(now_us);
-    }
-
-    fn room(&self) -> usize {
-        BUFFER - self.buffer.len()
-    }
-
-    fn answers(&mut self) -> Vec<Vec<u8>> {
-        std::mem::take(&mut self.answers)
-    }
-
     fn wake_us(&self) -> Option<u64> {
-        let stalled = (self.stalled_us > self.now_us).then_some(self.stalled_us);
+        let stalled = (self.port.stalled_us > self.now_us).then_some(self.port.stalled_us);
         self.until_us.into_iter().chain(stalled).min()
-    }
-
-    fn ink(&self) -> &Ink {
-        &self.ink
-    }
-
-    fn lost_bytes(&self) -> u64 {
-        self.lost
-    }
-
-    fn stall(&mut self, until_us: u64) {
-        self.stalled_us = until_us;
     }
 
     fn pen_is_down(&self) -> bool {

@@ -4,8 +4,7 @@
 //! Its parser reads from the end of the line and takes the last digit for tenths; bytes that come while it homes are lost,
 //! and so is what does not fit into its 20 characters. After homing it goes to 125, 125 by itself and says `1`.
 
-use super::Device;
-use crate::ink::Ink;
+use super::{Device, Port};
 
 /// Characters of a line, its end included.
 const BUFFER: usize = 20;
@@ -21,10 +20,9 @@ const RANGE: f64 = 250.0;
 /// The plotter.
 #[derive(Debug)]
 pub struct XyPlotter {
-    buffer: Vec<u8>,
+    port: Port,
     /// When the main loop looks at a whole line.
     flag_us: Option<u64>,
-    answers: Vec<Vec<u8>>,
     from: [f64; 2],
     to: [f64; 2],
     /// When it set out for `to`.
@@ -34,9 +32,6 @@ pub struct XyPlotter {
     homed: bool,
     within_mm: f64,
     down: bool,
-    ink: Ink,
-    lost: u64,
-    stalled_us: u64,
     now_us: u64,
 }
 
@@ -46,9 +41,8 @@ impl XyPlotter {
     pub fn new(homed: bool, within_mm: f64) -> Self {
         let middle = [125.0, 125.0];
         Self {
-            buffer: Vec::new(),
+            port: Port::new(BUFFER),
             flag_us: None,
-            answers: Vec::new(),
             from: if homed { middle } else { [0.0; 2] },
             to: middle,
             since_us: if homed { 0 } else { HOMING_US },
@@ -57,9 +51,6 @@ impl XyPlotter {
             homed,
             within_mm,
             down: false,
-            ink: Ink::default(),
-            lost: 0,
-            stalled_us: 0,
             now_us: 0,
         }
     }
@@ -93,21 +84,21 @@ impl XyPlotter {
     fn work(&mut self, now_us: u64) {
         if !self.homed && now_us >= self.homed_us {
             self.homed = true;
-            self.answers.push(b"0\n".to_vec());
+            self.port.answers.push(b"0\n".to_vec());
         }
         if !self.homed {
             return;
         }
         if !self.locked && now_us >= self.answers_us() {
             self.locked = true;
-            self.answers.push(b"1\n".to_vec());
+            self.port.answers.push(b"1\n".to_vec());
         }
         if now_us >= self.arrives_us() {
-            self.ink.go(self.to);
+            self.port.ink.go(self.to);
         }
-        if self.flag_us.is_some_and(|flag_us| now_us >= flag_us) && now_us >= self.stalled_us {
+        if self.flag_us.is_some_and(|flag_us| now_us >= flag_us) && now_us >= self.port.stalled_us {
             self.flag_us = None;
-            let line = std::mem::take(&mut self.buffer);
+            let line = std::mem::take(&mut self.port.buffer);
             self.command(&line, now_us);
         }
     }
@@ -118,9 +109,9 @@ impl XyPlotter {
             b'p' | b'P' => {
                 self.down = line[last] == b'P';
                 let here = self.at(now_us);
-                self.ink.go(here);
-                self.ink.pen(u16::from(self.down), here);
-                self.answers.push(b"1\n".to_vec());
+                self.port.ink.go(here);
+                self.port.ink.pen(u16::from(self.down), here);
+                self.port.answers.push(b"1\n".to_vec());
             }
             _ => {
                 // From the end: the last digit is tenths, points are passed over, there are no signs.
@@ -140,7 +131,7 @@ impl XyPlotter {
                     let here = self.at(now_us);
                     // It turns here; the same place again is no turn.
                     if here == self.to || self.to != [x, y] {
-                        self.ink.go(here);
+                        self.port.ink.go(here);
                     }
                     self.from = here;
                     self.to = [x, y];
@@ -153,6 +144,14 @@ impl XyPlotter {
 }
 
 impl Device for XyPlotter {
+    fn port(&self) -> &Port {
+        &self.port
+    }
+
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
+    }
+
     fn advance(&mut self, now_us: u64) {
         // Each thing at its time: an answer falls due before the line that follows it.
         while let Some(next_us) = self.wake_us().filter(|next_us| *next_us <= now_us) {
@@ -171,11 +170,11 @@ impl Device for XyPlotter {
     fn receive(&mut self, bytes: &[u8], now_us: u64) {
         self.advance(now_us);
         for &byte in bytes {
-            if !self.homed || self.buffer.len() >= BUFFER {
-                self.lost += u64::from(self.homed);
+            if !self.homed || self.port.buffer.len() >= BUFFER {
+                self.port.lost += u64::from(self.homed);
                 continue;
             }
-            self.buffer.push(byte);
+            self.port.buffer.push(byte);
             if byte == b'\n' && self.flag_us.is_none() {
                 self.flag_us = Some(now_us + LOOP_US);
             }
@@ -187,28 +186,12 @@ impl Device for XyPlotter {
         usize::MAX
     }
 
-    fn answers(&mut self) -> Vec<Vec<u8>> {
-        std::mem::take(&mut self.answers)
-    }
-
     fn wake_us(&self) -> Option<u64> {
         let homing = (!self.homed).then_some(self.homed_us);
         let answering = (self.homed && !self.locked).then(|| self.answers_us());
         let arriving = (self.homed && self.arrives_us() > self.now_us).then(|| self.arrives_us());
-        let flag = self.flag_us.map(|flag_us| flag_us.max(self.stalled_us));
+        let flag = self.flag_us.map(|flag_us| flag_us.max(self.port.stalled_us));
         homing.into_iter().chain(answering).chain(arriving).chain(flag).min()
-    }
-
-    fn ink(&self) -> &Ink {
-        &self.ink
-    }
-
-    fn lost_bytes(&self) -> u64 {
-        self.lost
-    }
-
-    fn stall(&mut self, until_us: u64) {
-        self.stalled_us = until_us;
     }
 
     fn pen_is_down(&self) -> bool {
