@@ -112,11 +112,11 @@ fn stays_within(
 ) -> Result<(), TestCaseError> {
     let placed = fitted(machine, drawing);
     let settings = Settings::new(tolerance, period_us);
-    let trajectory = plan(machine, placed.clone(), &settings).unwrap();
+    let trajectory = plan(machine, placed.clone(), &settings).expect("it fits");
     let rows: Vec<ExactRow> = trajectory.rows().collect();
     let period = period_us as f64 * 1e-6;
 
-    let (first, last) = (rows.first().unwrap().row, rows.last().unwrap().row);
+    let (first, last) = (rows.first().expect("rows").row, rows.last().expect("rows").row);
     let start = machine.ticks(&machine.start());
     prop_assert_eq!(first.ticks, [start.x.round() as i64, start.y.round() as i64]);
     prop_assert_eq!(last.ticks, first.ticks);
@@ -171,7 +171,7 @@ fn stays_within(
         if pair[0].row.pen > 0 {
             ink.extend((0..=4).map(|k| at(&pair[0], &pair[1], f64::from(k) / 4.0)));
         } else if !ink.is_empty() {
-            let stroke = strokes.next().unwrap();
+            let stroke = strokes.next().expect("a stroke for the ink");
             let line = stroke.flatten(tolerance / 100.0);
             for p in &ink {
                 let off = to_polyline(*p, &line);
