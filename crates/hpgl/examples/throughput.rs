@@ -1,4 +1,4 @@
-//! How fast files are read: `cargo run --release -p hpgl --example throughput -- FILE...`
+//! How fast files are read: `cargo run --release -p plotplan-hpgl --example throughput -- FILE...`
 //!
 //! Prints megabytes of input a second, the best of five runs each, for parsing alone and for reading to strokes.
 #![expect(clippy::disallowed_methods, reason = "a measurement needs the clock and its arguments")]

@@ -1,4 +1,4 @@
-//! The pictures of docs/planning.md: `cargo run -p planner --example planning_pictures -- docs/pictures`.
+//! The pictures of docs/planning.md: `cargo run -p plotplan-planner --example planning_pictures -- docs/pictures`.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! How much longer motions take under jerk limits than without, on the same path: `cargo test -p planner --release --test jerk
+//! How much longer motions take under jerk limits than without, on the same path: `cargo test -p plotplan-planner --release --test jerk
 //! -- --nocapture` prints the table of docs/planning.md.
 
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};

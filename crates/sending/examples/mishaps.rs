@@ -1,4 +1,4 @@
-//! `cargo run --release -p sending --example mishaps`: how many mishaps of each kind are tried in memory, and how often ink was
+//! `cargo run --release -p plotplan-sending --example mishaps`: how many mishaps of each kind are tried in memory, and how often ink was
 //! lost or drawn twice. The table in docs/sending.md is what it prints.
 
 #![allow(clippy::print_stdout, reason = "it prints a table")]

@@ -1,4 +1,4 @@
-//! Rows a second through the verifier: `cargo run --release -p verify --example throughput [-- PART-OF-A-NAME]`.
+//! Rows a second through the verifier: `cargo run --release -p plotplan-verify --example throughput [-- PART-OF-A-NAME]`.
 //!
 //! The plans run through the drawing's points at an even speed; what the motors would say to that is no matter here.
 
