@@ -54,8 +54,8 @@ fn plan(file: &str, machine: &str, options: &[&str]) -> TickTable {
 /// The drawing where the plan puts it.
 fn placed(file: &str, plan: &TickTable) -> Drawing {
     let bytes = std::fs::read(top().join(file)).expect("a drawing");
-    let reading = hpgl::read(&bytes, &hpgl::Options::default());
-    let mut drawing = reading.pages[0].drawing.clone();
+    let document = hpgl::read(&bytes, &hpgl::Options::default());
+    let mut drawing = document.pages[0].drawing.clone();
     drawing.transform(Affine::new(plan.header.placement));
     drawing
 }

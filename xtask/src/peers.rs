@@ -140,14 +140,14 @@ fn notes() -> Result<BTreeMap<String, Vec<Note>>> {
 
 fn compare(file: &Path, work: &Path) -> Result<Row> {
     let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let reading = hpgl::read(&bytes, &hpgl::Options::default());
+    let document = hpgl::read(&bytes, &hpgl::Options::default());
     // hp2xx draws all pages on one.
-    let strokes = reading.pages.iter().flat_map(|page| &page.drawing.strokes);
+    let strokes = document.pages.iter().flat_map(|page| &page.drawing.strokes);
     let mut ours: Polylines = strokes.map(|stroke| stroke.flatten(CHORD_MM)).collect();
     let theirs = hp2xx(file, work)?.map(|text| polylines(&text));
     let is_finite = |lines: &Polylines| lines.iter().flatten().all(|p| p.x.is_finite() && p.y.is_finite());
     let theirs = theirs.filter(|lines| !lines.is_empty() && is_finite(lines));
-    let used = |name: &[u8; 2]| reading.summary.used.iter().any(|(mnemonic, _)| mnemonic.0 == *name);
+    let used = |name: &[u8; 2]| document.summary.used.iter().any(|(mnemonic, _)| mnemonic.0 == *name);
     let text_or_fill = [b"LB", b"PB", b"SM", b"FP", b"RA", b"RR", b"WG", b"UC"].into_iter().any(used);
     let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let ours_mm = length(&ours);

@@ -1,9 +1,9 @@
 //! HP-GL and HP-GL/2, the languages of pen plotters: from bytes to a [`Drawing`], and back.
 //!
 //! ```
-//! let reading = hpgl::read(b"IN;SP1;PU0,0;PD400,0,400,400;PU;", &hpgl::Options::default());
-//! assert_eq!(reading.pages[0].drawing.length(), 20.0); // mm
-//! assert!(reading.diagnostics.is_empty());
+//! let document = hpgl::read(b"IN;SP1;PU0,0;PD400,0,400,400;PU;", &hpgl::Options::default());
+//! assert_eq!(document.pages[0].drawing.length(), 20.0); // mm
+//! assert!(document.diagnostics.is_empty());
 //! ```
 //!
 //! Two passes, two types: [`parse`] turns bytes into a [`Syntax`] (commands, numbers, where they stand),
@@ -45,7 +45,7 @@ pub use units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
 
 /// What a file draws, and what there is to say about it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct Document {
     /// The sheets in order; at least one, even where nothing is drawn.
     pub pages: Vec<Page>,
     /// What was found, one entry a kind, in the order of their first places.
@@ -85,7 +85,7 @@ pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {
 /// Reads a file: parse and interpret in one go, in memory that follows the drawing.
 ///
 /// The result is the same as that of [`interpret`] on [`parse`].
-pub fn read(bytes: &[u8], options: &Options) -> Reading {
+pub fn read(bytes: &[u8], options: &Options) -> Document {
     let mut parser = parser::Parser::new(bytes, options.label_terminator);
     let mut interpreter = interpreter::Interpreter::new(options, bytes.len());
     let mut placed = 0;

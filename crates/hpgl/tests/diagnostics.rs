@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 fn diagnostics_of_a_bad_file() {
     let file = b"\xef\xbb\xbfIN;PD400,0,7;QQ1,2;LBno end;SC0,0,0,1;RO45;PD99999999999,0;AA1;EP;DT\0;\
         SP0;PD1,1;SP1;IW5,5,5,5;PD1000,,0;IW;PM1;PG;PD4\n5,6;PM0;EA1,1;";
-    let reading = hpgl::read(file, &hpgl::Options::default());
+    let document = hpgl::read(file, &hpgl::Options::default());
     let mut text = String::new();
-    for diagnostic in &reading.diagnostics {
+    for diagnostic in &document.diagnostics {
         let place = diagnostic.pen_position;
         writeln!(
             text,

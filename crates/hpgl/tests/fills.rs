@@ -1,16 +1,16 @@
 //! Fills, line patterns and ticks: what is drawn by rules rather than by coordinates.
 
-use hpgl::{Options, Reading, read};
+use hpgl::{Document, Options, read};
 use proptest::prelude::*;
 
-fn reading(file: &str) -> Reading {
+fn document(file: &str) -> Document {
     read(file.as_bytes(), &Options::default())
 }
 
 /// Strokes of the first page as `x,y x,y`, in plotter units.
 fn ink(file: &str) -> Vec<String> {
     let plu = |mm: f64| ((mm / hpgl::PLOTTER_UNIT_MM * 1e4).round() / 1e4 + 0.0).to_string();
-    let strokes = &reading(file).pages[0].drawing.strokes;
+    let strokes = &document(file).pages[0].drawing.strokes;
     strokes
         .iter()
         .map(|stroke| {
@@ -22,7 +22,7 @@ fn ink(file: &str) -> Vec<String> {
 }
 
 fn codes(file: &str) -> Vec<&'static str> {
-    reading(file).diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect()
+    document(file).diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect()
 }
 
 #[test]
@@ -160,7 +160,7 @@ proptest! {
     ) {
         let list: Vec<String> = corners.iter().map(|(x, y)| format!("{x},{y}")).collect();
         let file = format!("IN;SP1;FT3,4,{angle};PU{};PM0;PD{};PM2;FP;", list[0], list[1..].join(","));
-        let strokes = reading(&file).pages[0].drawing.strokes.clone();
+        let strokes = document(&file).pages[0].drawing.strokes.clone();
         let ink: f64 = strokes.iter().map(|stroke| stroke.length() / hpgl::PLOTTER_UNIT_MM).sum();
         // The area by parity, counted on a grid of points.
         let step = 20;
@@ -218,8 +218,8 @@ fn line_patterns_begin_anew_after_some_commands() {
     ] {
         // 10 mm a pattern, half of it ink; the first line ends 2.5 mm into its second stroke.
         let file = format!("IN;SP1;LT2,10,1;PU0,0;PD500,0;{between}PU0,4000;PD400,4000;PU;");
-        let reading = read(file.as_bytes(), &Options::default());
-        let upper = reading.pages[0].drawing.strokes.iter().find(|stroke| stroke.start().y == 100.0);
+        let document = read(file.as_bytes(), &Options::default());
+        let upper = document.pages[0].drawing.strokes.iter().find(|stroke| stroke.start().y == 100.0);
         let end = upper.map(|stroke| stroke.end().x);
         assert_eq!(end, Some(if anew { 5.0 } else { 2.5 }), "{between}");
     }

@@ -2,22 +2,26 @@
 //! of letters are the font's business.
 
 use drawing::Rect;
-use hpgl::{Options, Reading, read};
+use hpgl::{Document, Options, read};
 
-fn reading(file: &[u8]) -> Reading {
+fn document(file: &[u8]) -> Document {
     read(file, &Options::default())
 }
 
 /// Bounds of all ink, plotter units.
 fn bounds(file: &[u8]) -> Rect {
-    reading(file).pages[0].drawing.bounding_box().expect("ink").scale_from_origin(1.0 / hpgl::PLOTTER_UNIT_MM)
+    document(file).pages[0]
+        .drawing
+        .bounding_box()
+        .expect("ink")
+        .scale_from_origin(1.0 / hpgl::PLOTTER_UNIT_MM)
 }
 
 /// Where the pen is at the end, plotter units: a dot there is the last stroke.
 fn end(file: &str) -> (f64, f64) {
     let file = format!("{file};PD;PU;");
-    let reading = reading(file.as_bytes());
-    let last = reading.pages[0].drawing.strokes.last().expect("a dot");
+    let document = document(file.as_bytes());
+    let last = document.pages[0].drawing.strokes.last().expect("a dot");
     assert!(last.is_dot());
     let round = |mm: f64| (mm / hpgl::PLOTTER_UNIT_MM * 1e6).round() / 1e6;
     (round(last.start().x), round(last.start().y))
@@ -80,7 +84,7 @@ fn label_origins() {
     close(of(15), (-500.0, -400.0, 500.0, 400.0));
     close(of(19), (-1200.0, -1200.0, -200.0, -400.0));
     close(of(21), (0.0, 0.0, 1000.0, 800.0));
-    assert_eq!(reading(b"IN;SP1;LO10;LBA\x03").diagnostics[0].code.name(), "H0203");
+    assert_eq!(document(b"IN;SP1;LO10;LBA\x03").diagnostics[0].code.name(), "H0203");
     // Every line is justified by itself.
     close(bounds(b"IN;SP1;SI1,2;LO4;PA0,0;LBAA\r\nA\x03"), (-500.0, -1600.0, 500.0, 800.0));
 }
@@ -111,8 +115,8 @@ fn control_characters_and_cells() {
 #[test]
 fn pens_and_patterns() {
     // A label is drawn with the pen up or down, solid, and leaves the pen as it was.
-    let reading = reading(b"IN;SP3;LT2,1,1;PU0,0;LBI\x03PA100,100;PD;PU;");
-    let strokes = &reading.pages[0].drawing.strokes;
+    let document = document(b"IN;SP3;LT2,1,1;PU0,0;LBI\x03PA100,100;PD;PU;");
+    let strokes = &document.pages[0].drawing.strokes;
     assert_eq!(strokes.len(), 2);
     assert!(strokes.iter().all(|stroke| stroke.pen.0 == 3));
 }
@@ -121,9 +125,9 @@ fn pens_and_patterns() {
 fn character_sets() {
     // The same word in four ways of writing it.
     let same = |file: &[u8]| {
-        let reading = reading(file);
-        assert_eq!(reading.diagnostics, []);
-        reading.pages[0].drawing.strokes.iter().map(|stroke| stroke.vertices().to_vec()).collect::<Vec<_>>()
+        let document = document(file);
+        assert_eq!(document.diagnostics, []);
+        document.pages[0].drawing.strokes.iter().map(|stroke| stroke.vertices().to_vec()).collect::<Vec<_>>()
     };
     let word = same(b"IN;SP1;LBGr\xfc\xdfe\x03");
     assert_eq!(word, same("IN;SP1;LBGrüße\x03".as_bytes()));
@@ -131,17 +135,17 @@ fn character_sets() {
     assert_eq!(word, same(b"IN;SP1;SD1,405;LBGr\x81\xe1e\x03"));
     assert_eq!(word, same(b"IN;SP1;CA33;LBGr\x0e}~\x0fe\x03"));
     assert_eq!(word, same(b"IN;SP1;CA33;SA;LBGr}~e\x03"));
-    let reading = reading(b"IN;SP1;LBa\xe6\xbc\xa2b\x03");
-    let diagnostic = &reading.diagnostics[0];
+    let document = document(b"IN;SP1;LBa\xe6\xbc\xa2b\x03");
+    let diagnostic = &document.diagnostics[0];
     assert_eq!(diagnostic.code.name(), "H0220");
     assert_eq!((diagnostic.span.start, diagnostic.span.end), (10, 13));
-    assert_eq!(crate::reading(b"IN;SP1;CS77;LBa\x03").diagnostics[0].code.name(), "H0224");
+    assert_eq!(crate::document(b"IN;SP1;CS77;LBa\x03").diagnostics[0].code.name(), "H0224");
 }
 
 #[test]
 fn symbols_stand_on_points() {
-    let reading = reading(b"IN;SP1;SI1,2;SM+;PA1000,1000;PD2000,1000;SM;PD3000,1000;PU;");
-    let strokes = &reading.pages[0].drawing.strokes;
+    let document = document(b"IN;SP1;SI1,2;SM+;PA1000,1000;PD2000,1000;SM;PD3000,1000;PU;");
+    let strokes = &document.pages[0].drawing.strokes;
     // Two bars at each of two points, and the line in two strokes.
     assert_eq!(strokes.len(), 6);
     let symbol = strokes[0].bounding_box().union(strokes[1].bounding_box());
@@ -155,6 +159,6 @@ fn user_characters_have_a_grid_in_their_cell() {
     close(bounds(b"IN;SP1;SI1,2;PA100,100;UC99,4,0,0,8,-4,0,0,-8;"), (100.0, 100.0, 500.0, 900.0));
     assert_eq!(end("IN;SP1;SI1,2;PA100,100;UC99,4,0"), (700.0, 100.0));
     // The pen begins up, and goes up between.
-    let reading = reading(b"IN;SP1;SI1,2;PA0,0;UC1,0,99,1,0,-99,1,0,99,1,0;");
-    assert_eq!(reading.pages[0].drawing.strokes.len(), 2);
+    let document = document(b"IN;SP1;SI1,2;PA0,0;UC1,0,99,1,0,-99,1,0,99,1,0;");
+    assert_eq!(document.pages[0].drawing.strokes.len(), 2);
 }

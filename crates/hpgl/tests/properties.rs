@@ -33,25 +33,25 @@ fn any_file() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![4 => almost_hpgl(), 1 => proptest::collection::vec(any::<u8>(), 0..300)]
 }
 
-fn check(bytes: &[u8]) -> hpgl::Reading {
+fn check(bytes: &[u8]) -> hpgl::Document {
     let options = Options::default();
-    let reading = read(bytes, &options);
-    assert_eq!(reading, interpret(&parse(bytes, &options), &options));
-    assert!(!reading.pages.is_empty());
-    for stroke in reading.pages.iter().flat_map(|page| &page.drawing.strokes) {
+    let document = read(bytes, &options);
+    assert_eq!(document, interpret(&parse(bytes, &options), &options));
+    assert!(!document.pages.is_empty());
+    for stroke in document.pages.iter().flat_map(|page| &page.drawing.strokes) {
         assert!(stroke.pen.0 > 0);
         assert!(stroke.source().start < stroke.source().end && stroke.source().end <= bytes.len());
         assert!(stroke.vertices().iter().all(|p| p.x.is_finite() && p.y.is_finite()));
     }
-    for diagnostic in &reading.diagnostics {
+    for diagnostic in &document.diagnostics {
         assert!(diagnostic.span.start <= diagnostic.span.end && diagnostic.span.end <= bytes.len());
         assert!(diagnostic.pen_position.x.is_finite() && diagnostic.pen_position.y.is_finite());
         assert!(diagnostic.count > 0);
     }
-    for pair in reading.diagnostics.windows(2) {
+    for pair in document.diagnostics.windows(2) {
         assert!(pair[0].span.start <= pair[1].span.start);
     }
-    reading
+    document
 }
 
 proptest! {
@@ -97,11 +97,11 @@ fn one_command_as_long_as_a_file() {
     for k in 0..100_000 {
         file.extend_from_slice(format!("{},{},", k % 1000, k / 1000).as_bytes());
     }
-    let reading = check(&file);
-    assert_eq!(reading.pages[0].drawing.strokes.len(), 1);
+    let document = check(&file);
+    assert_eq!(document.pages[0].drawing.strokes.len(), 1);
     // The first point is where the pen is already.
-    assert_eq!(reading.pages[0].drawing.strokes[0].segment_count(), 99_999);
-    assert_eq!(reading.summary.commands, 4);
+    assert_eq!(document.pages[0].drawing.strokes[0].segment_count(), 99_999);
+    assert_eq!(document.summary.commands, 4);
 }
 
 /// Inputs that tempt a reader to look at the rest of the file again and again. Each is read in a second or so in an

@@ -5,17 +5,17 @@
 
 use std::fmt::Write as _;
 
-use hpgl::{Generation, Options, Point, ProfileReason, Reading, Severity, Wrappers, read};
+use hpgl::{Document, Generation, Options, Point, ProfileReason, Severity, Wrappers, read};
 
-fn reading(bytes: &[u8]) -> Reading {
+fn document(bytes: &[u8]) -> Document {
     let options = Options::default();
-    let reading = read(bytes, &options);
-    assert_eq!(reading, hpgl::interpret(&hpgl::parse(bytes, &options), &options), "one pass and two differ");
-    reading
+    let document = read(bytes, &options);
+    assert_eq!(document, hpgl::interpret(&hpgl::parse(bytes, &options), &options), "one pass and two differ");
+    document
 }
 
 /// The strokes of the first page in plotter units: `pen: x,y x,y ...`, curves marked by `~` before their end.
-fn ink(reading: &Reading) -> Vec<String> {
+fn ink(document: &Document) -> Vec<String> {
     let stroke = |stroke: &drawing::Stroke| {
         let plu = |mm: f64| {
             let value = mm / hpgl::PLOTTER_UNIT_MM;
@@ -28,18 +28,18 @@ fn ink(reading: &Reading) -> Vec<String> {
         }
         text
     };
-    reading.pages[0].drawing.strokes.iter().map(stroke).collect()
+    document.pages[0].drawing.strokes.iter().map(stroke).collect()
 }
 
-fn codes(reading: &Reading) -> Vec<&'static str> {
-    reading.diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect()
+fn codes(document: &Document) -> Vec<&'static str> {
+    document.diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect()
 }
 
 #[track_caller]
 fn check(bytes: &[u8], strokes: &[&str], diagnostics: &[&str]) {
-    let reading = reading(bytes);
-    assert_eq!(ink(&reading), strokes, "ink of {:?}", bytes.escape_ascii().to_string());
-    assert_eq!(codes(&reading), diagnostics, "diagnostics of {:?}", bytes.escape_ascii().to_string());
+    let document = document(bytes);
+    assert_eq!(ink(&document), strokes, "ink of {:?}", bytes.escape_ascii().to_string());
+    assert_eq!(codes(&document), diagnostics, "diagnostics of {:?}", bytes.escape_ascii().to_string());
 }
 
 /// The same corner, however it is said.
@@ -126,7 +126,7 @@ fn stray_bytes() {
     corner(b"\x03IN;SP1;PA0,0;PD400,0,400,400;", &["H0103"]);
     // UTF-16 is ASCII with a NUL after each byte.
     let wide: Vec<u8> = b"IN;SP1;PA0,0;PD400,0,400,400;PU;".iter().flat_map(|&b| [b, 0]).collect();
-    assert_eq!(ink(&reading(&wide)), ["1: 0,0 400,0 400,400"]);
+    assert_eq!(ink(&document(&wide)), ["1: 0,0 400,0 400,400"]);
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn names_that_are_none() {
         &["H0102", "H0101", "H0105"],
     );
     assert_eq!(
-        ink(&reading(b"IN;SP1;PA0,0;PD400,0,400,400;PU;THIS TEXT IS NOT A PLOT")),
+        ink(&document(b"IN;SP1;PA0,0;PD400,0,400,400;PU;THIS TEXT IS NOT A PLOT")),
         ["1: 0,0 400,0 400,400"]
     );
     corner(b"INPU;SP1;PU0,0;PD400,0,400,400;", &[]);
@@ -184,13 +184,13 @@ fn wrappers() {
 #[test]
 fn text_does_not_swallow_the_plot() {
     let hidden = |text: &[u8]| {
-        let reading = reading(text);
+        let document = document(text);
         assert!(
-            reading.pages[0].drawing.bounding_box().is_some_and(|b| b.x1 >= 10.0 && b.x1 < 100.0),
+            document.pages[0].drawing.bounding_box().is_some_and(|b| b.x1 >= 10.0 && b.x1 < 100.0),
             "{:?}",
             text.escape_ascii().to_string()
         );
-        codes(&reading).contains(&"H0110") || codes(&reading).contains(&"H0112")
+        codes(&document).contains(&"H0110") || codes(&document).contains(&"H0112")
     };
     assert!(!hidden(b"IN;SP1;PA0,0;LBhi\x03PD400,0;PU;SP0;"));
     assert!(!hidden(b"IN;SP1;DT#;PA0,0;LBhi#PD400,0;PU;DT;SP0;"));
@@ -265,14 +265,14 @@ fn arcs() {
     check(b"IN;SP1;PA400,0;PD;AA0,0,90,45;PU;", &["1: 400,0 282.8427,282.8427 0,400"], &[]);
     check(b"IN;SP1;PA400,0;PD;AA0,0,90,5;PU;", &["1: 400,0 ~0,400"], &[]);
     // Radius 4000, 10 off the chord: 2 acos(1 - 10/4000) = 8.1 degrees, so that 90 degrees take twelve chords.
-    let chords = ink(&reading(b"IN;SP1;CT1;PA4000,0;PD;AA0,0,90,10;PU;"));
+    let chords = ink(&document(b"IN;SP1;CT1;PA4000,0;PD;AA0,0,90,10;PU;"));
     assert_eq!(chords[0].split(' ').count(), 1 + 1 + 12);
     // Turns beyond the first retrace it; the pen still ends where it should.
     check(b"IN;SP1;PA400,0;PD;AA0,0,3690;PA0,0;PU;", &["1: 400,0 ~0,400 0,0"], &["H0227"]);
-    let ellipse = reading(b"IN;SP1;IP0,0,2000,1000;SC-1,1,-1,1;PA1,0;PD;AA0,0,90;PU;");
+    let ellipse = document(b"IN;SP1;IP0,0,2000,1000;SC-1,1,-1,1;PA1,0;PD;AA0,0,90;PU;");
     assert_eq!(ink(&ellipse), ["1: 2000,500 ~1000,1000"]);
     // Mirrored: counterclockwise in user units is clockwise on the page.
-    let mirrored = reading(b"IN;SP1;IP0,0,1000,1000;SC1,-1,-1,1;PA1,0;PD;AA0,0,90;PU;");
+    let mirrored = document(b"IN;SP1;IP0,0,1000,1000;SC1,-1,-1,1;PA1,0;PD;AA0,0,90;PU;");
     assert_eq!(ink(&mirrored), ["1: 0,500 ~500,1000"]);
     check(b"IN;SP1;PA400,0;PD;AA0,0;PA400,100;PU;", &["1: 400,0 400,100"], &["H0204"]);
 }
@@ -281,10 +281,10 @@ fn arcs() {
 fn arcs_through_points() {
     let half = std::f64::consts::PI * 200.0 * hpgl::PLOTTER_UNIT_MM;
     for file in [&b"IN;SP1;PA0,0;PD;AT200,200,400,0;PU;"[..], b"IN;SP1;PA0,0;PD;RT200,200,400,0;PU;"] {
-        let reading = reading(file);
-        assert_eq!(ink(&reading), ["1: 0,0 ~400,0"]);
-        assert!((reading.pages[0].drawing.length() - half).abs() < 1e-9);
-        let top = reading.pages[0].drawing.bounding_box().unwrap().y1;
+        let document = document(file);
+        assert_eq!(ink(&document), ["1: 0,0 ~400,0"]);
+        assert!((document.pages[0].drawing.length() - half).abs() < 1e-9);
+        let top = document.pages[0].drawing.bounding_box().unwrap().y1;
         assert!((top - 5.0).abs() < 1e-9, "over the upper side");
     }
     // All on a line, in between: a line. Beyond the end: there and back. First equal to last: a circle.
@@ -292,7 +292,7 @@ fn arcs_through_points() {
     check(b"IN;SP1;PA0,0;PD;AT600,0,400,0;PU;", &["1: 0,0 600,0 400,0"], &["H0215"]);
     check(b"IN;SP1;PA0,0;PD;AT0,0,400,0;PU;", &["1: 0,0 400,0"], &["H0215"]);
     check(b"IN;SP1;PA7,7;PD;AT7,7,7,7;PU;", &["1: 7,7"], &["H0215"]);
-    let circle = reading(b"IN;SP1;PA0,0;PD;AT400,0,0,0;PU;");
+    let circle = document(b"IN;SP1;PA0,0;PD;AT400,0,0,0;PU;");
     assert!((circle.pages[0].drawing.length() - 2.0 * half).abs() < 1e-9);
     // A vendor's RT with one number is not an arc.
     check(b"IN;\nRT10;\nSP1;PA0,0;PD400,0;", &["1: 0,0 400,0"], &["H0204"]);
@@ -315,7 +315,7 @@ fn circles() {
 fn curves() {
     check(b"IN;SP1;PA0,0;PD;BZ0,400,400,400,400,0;PU;", &["1: 0,0 ~400,0"], &[]);
     check(b"IN;SP1;PA100,100;PD;BR0,400,400,400,400,0;PU;", &["1: 100,100 ~500,100"], &[]);
-    let curve = reading(b"IN;SP1;PA0,0;PD;BZ0,400,400,400,400,0,1,1;PU;");
+    let curve = document(b"IN;SP1;PA0,0;PD;BZ0,400,400,400,400,0,1,1;PU;");
     assert_eq!(codes(&curve), ["H0206"]);
     // The middle of that cubic is at 3/4 of the height of its control points.
     assert!((curve.pages[0].drawing.bounding_box().unwrap().y1 - 7.5).abs() < 1e-9);
@@ -479,11 +479,11 @@ fn polygons() {
 
 #[test]
 fn pages() {
-    let reading = reading(b"IN;SP1;PD400,0;PG;PU;PD0,400;PG;AF;");
-    assert_eq!(reading.pages.len(), 2);
-    assert_eq!(codes(&reading), ["H0214"]);
-    assert!(reading.diagnostics.iter().all(|diagnostic| diagnostic.severity == Severity::Note));
-    assert_eq!(ink(&reading), ["1: 0,0 400,0"]);
+    let document = document(b"IN;SP1;PD400,0;PG;PU;PD0,400;PG;AF;");
+    assert_eq!(document.pages.len(), 2);
+    assert_eq!(codes(&document), ["H0214"]);
+    assert!(document.diagnostics.iter().all(|diagnostic| diagnostic.severity == Severity::Note));
+    assert_eq!(ink(&document), ["1: 0,0 400,0"]);
 }
 
 #[test]
@@ -492,16 +492,16 @@ fn findings_are_counted_not_repeated() {
     for _ in 0..1000 {
         file.extend_from_slice(b"QQ1,2;PD1,2,3;ZZ;");
     }
-    let reading = reading(&file);
-    assert_eq!(codes(&reading), ["H0101", "H0206", "H0101"]);
-    assert!(reading.diagnostics.iter().all(|diagnostic| diagnostic.count == 1000));
-    assert_eq!(reading.summary.commands, 2 + 3000);
+    let document = document(&file);
+    assert_eq!(codes(&document), ["H0101", "H0206", "H0101"]);
+    assert!(document.diagnostics.iter().all(|diagnostic| diagnostic.count == 1000));
+    assert_eq!(document.summary.commands, 2 + 3000);
 }
 
 #[test]
 fn places_of_findings() {
-    let reading = reading(b"IN;SP1;PA400,800;QQ1;");
-    let diagnostic = &reading.diagnostics[0];
+    let document = document(b"IN;SP1;PA400,800;QQ1;");
+    let diagnostic = &document.diagnostics[0];
     assert_eq!((diagnostic.span.start, diagnostic.span.end), (17, 19));
     assert_eq!(diagnostic.command, 4);
     assert_eq!((diagnostic.pen_position.x, diagnostic.pen_position.y), (10.0, 20.0));
@@ -510,25 +510,25 @@ fn places_of_findings() {
 #[test]
 fn strokes_know_their_bytes() {
     let file = b"IN;SP1;PU0,0;PD400,0;PA400,400;PU;";
-    let reading = reading(file);
-    let source = reading.pages[0].drawing.strokes[0].source();
+    let document = document(file);
+    let source = document.pages[0].drawing.strokes[0].source();
     assert_eq!(&file[source.start..source.end], b"PD400,0;PA400,400;");
 }
 
 #[test]
 fn pens_and_what_the_file_says_about_them() {
-    let reading = reading(b"IN;SP1;VS20;PW.5;PD400,0;VS10,2;FS3,2;SP2;PD400,400;SP3;PD0,0;");
-    let pens = &reading.pages[0].pens;
+    let document = document(b"IN;SP1;VS20;PW.5;PD400,0;VS10,2;FS3,2;SP2;PD400,400;SP3;PD0,0;");
+    let pens = &document.pages[0].pens;
     assert_eq!(pens.len(), 3);
     let of = |pen| pens[&hpgl::Pen(pen)];
     assert_eq!((of(1).speed_mm_s, of(1).width_mm, of(1).force), (Some(200.0), Some(0.5), None));
     assert_eq!((of(2).speed_mm_s, of(2).force), (Some(100.0), Some(3.0)));
     assert_eq!(of(3).speed_mm_s, Some(200.0));
     // The gentlest speed that the pen was ever told while it drew.
-    let slow = crate::reading(b"IN;SP1;VS5;VS20;PD400,0;VS10;PD400,400;VS30;PU;");
+    let slow = crate::document(b"IN;SP1;VS5;VS20;PD400,0;VS10;PD400,400;VS30;PU;");
     assert_eq!(slow.pages[0].pens[&hpgl::Pen(1)].speed_mm_s, Some(100.0));
     // Percent of the diagonal, 25 mm.
-    let wide = crate::reading(b"IN;SP1;IP0,0,600,800;WU1;PW2;PD400,0;");
+    let wide = crate::document(b"IN;SP1;IP0,0,600,800;WU1;PW2;PD400,0;");
     assert_eq!(wide.pages[0].pens[&hpgl::Pen(1)].width_mm, Some(0.5));
 }
 
@@ -536,7 +536,7 @@ fn pens_and_what_the_file_says_about_them() {
 fn the_file_chooses_its_plotter() {
     // No IP: the scaling points of the 7475A on A4, on A3 where PS says so, the corners of the page in HP-GL/2.
     let scaled =
-        |setup: &str, rest: &str| reading(format!("{setup}IN;{rest}SP1;SC0,1,0,1;PA0,0;PD1,1;").as_bytes());
+        |setup: &str, rest: &str| document(format!("{setup}IN;{rest}SP1;SC0,1,0,1;PA0,0;PD1,1;").as_bytes());
     assert_eq!(ink(&scaled("", "")), ["1: 603,521 10603,7721"]);
     assert_eq!(codes(&scaled("", "")), ["H0226"]);
     assert_eq!(ink(&scaled("", "PS0;")), ["1: 170,602 15370,10602"]);
@@ -546,8 +546,8 @@ fn the_file_chooses_its_plotter() {
     assert_eq!(codes(&scaled("BP;", "PS4000,2000;")), [""; 0]);
     // A plotter named in the options stays.
     let options = Options::for_plotter("hp7475a", Some("a3")).expect("built in");
-    let reading = read(b"IN;PS4;SP1;SC0,1,0,1;PA0,0;PD1,1;", &options);
-    let end = reading.pages[0].drawing.strokes[0].end();
+    let document = read(b"IN;PS4;SP1;SC0,1,0,1;PA0,0;PD1,1;", &options);
+    let end = document.pages[0].drawing.strokes[0].end();
     assert!((end.x - 15370.0 * hpgl::PLOTTER_UNIT_7475A_MM).abs() < 1e-9);
 }
 
@@ -604,10 +604,10 @@ fn absurd_numbers_are_told() {
         (b"IN;SP1;PS0,0;", "H0203"),
     ] {
         let name = String::from_utf8_lossy(file);
-        let reading = read(&[file, b"PA;PU7000,7000;PD7400,7000;PU;"].concat(), &Options::default());
-        let codes: Vec<&str> = reading.diagnostics.iter().map(|d| d.code.name()).collect();
+        let document = read(&[file, b"PA;PU7000,7000;PD7400,7000;PU;"].concat(), &Options::default());
+        let codes: Vec<&str> = document.diagnostics.iter().map(|d| d.code.name()).collect();
         assert!(codes.contains(&code), "{name}: {codes:?}");
-        let last = reading.pages[0].drawing.strokes.last().map(|stroke| (stroke.start(), stroke.end()));
+        let last = document.pages[0].drawing.strokes.last().map(|stroke| (stroke.start(), stroke.end()));
         assert_eq!(last, Some((Point::new(175.0, 175.0), Point::new(185.0, 175.0))), "{name}");
     }
 }

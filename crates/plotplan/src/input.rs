@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use drawing::Drawing;
-use hpgl::{Reading, Severity};
+use hpgl::{Document, Severity};
 use kinematics::Machine;
 use plotplan::machine_file::{MachineFile, PRESETS, nearest};
 
@@ -41,7 +41,7 @@ pub(crate) const STRICT: &str = "there are warnings, and --strict takes them for
 
 /// A drawing's file, read, and the page that was asked for.
 pub(crate) struct Drawn {
-    pub(crate) reading: Reading,
+    pub(crate) reading: Document,
     page: usize,
 }
 
@@ -67,7 +67,7 @@ pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<Drawn, 
     let reading = if formats::points::looks_like_points(&input.bytes) {
         let drawing = formats::points::read(&input.bytes);
         let page = hpgl::Page { drawing, ..hpgl::Page::default() };
-        Reading { pages: vec![page], diagnostics: Vec::new(), ..hpgl::read(b"", &options) }
+        Document { pages: vec![page], diagnostics: Vec::new(), ..hpgl::read(b"", &options) }
     } else {
         hpgl::read(&input.bytes, &options)
     };

@@ -171,9 +171,9 @@ mod tests {
             let mut bytes = b"IN;SP1;".to_vec();
             let mut chance = Chance(7);
             (0..20).for_each(|_| make(&mut bytes, &mut chance));
-            let reading = hpgl::read(&bytes, &hpgl::Options::default());
-            assert_eq!(reading.diagnostics, []);
-            assert!(reading.pages[0].drawing.strokes.len() >= 20);
+            let document = hpgl::read(&bytes, &hpgl::Options::default());
+            assert_eq!(document.diagnostics, []);
+            assert!(document.pages[0].drawing.strokes.len() >= 20);
         }
     }
 }

@@ -163,9 +163,9 @@ pub(super) fn run(python: &str) -> Result<bool> {
 
 /// The workload as the pipeline gets it: written as HPGL and read back.
 fn read(points: &[Point]) -> Result<Drawing> {
-    let reading = hpgl::read(workload::hpgl(points).as_bytes(), &hpgl::Options::default());
-    anyhow::ensure!(reading.diagnostics.is_empty(), "the workload is read with {:?}", reading.diagnostics);
-    let page = reading.pages.into_iter().next().context("a reading without a page")?;
+    let document = hpgl::read(workload::hpgl(points).as_bytes(), &hpgl::Options::default());
+    anyhow::ensure!(document.diagnostics.is_empty(), "the workload is read with {:?}", document.diagnostics);
+    let page = document.pages.into_iter().next().context("a document without a page")?;
     anyhow::ensure!(page.drawing.strokes.len() == 1, "the workload is one stroke");
     Ok(page.drawing)
 }

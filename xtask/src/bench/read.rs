@@ -121,8 +121,8 @@ fn measure(folder: &Path, class: &str) -> Result<Figures> {
     let [one, ten] = [0, 1].map(|k| fastest(|| hpgl::read(&inputs[k], &options)).1);
     let flattened = if matches!(class, "arcs" | "labels") {
         fastest(|| {
-            let reading = hpgl::read(&inputs[1], &options);
-            let strokes = reading.pages.iter().flat_map(|page| &page.drawing.strokes);
+            let document = hpgl::read(&inputs[1], &options);
+            let strokes = document.pages.iter().flat_map(|page| &page.drawing.strokes);
             strokes.map(|stroke| stroke.flatten(CHORD_MM).len()).sum::<usize>()
         })
         .1
@@ -207,13 +207,13 @@ fn memory(file: &Path) -> Result<Option<f64>> {
 /// Reads one file into a drawing and prints the largest resident memory so far, bytes, where the system tells it.
 pub(crate) fn once(file: &Path) -> Result<bool> {
     let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let reading = hpgl::read(&bytes, &hpgl::Options::default());
+    let document = hpgl::read(&bytes, &hpgl::Options::default());
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB"));
     if let Some(peak) = peak.and_then(|peak| peak.parse::<u64>().ok()) {
         println!("{}", peak * 1024);
     }
-    Ok(!reading.pages.is_empty())
+    Ok(!document.pages.is_empty())
 }
 
 #[cfg(test)]

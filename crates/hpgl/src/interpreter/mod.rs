@@ -21,7 +21,7 @@ use crate::diagnostics::{Code, Findings};
 use crate::fonts::Glyph;
 use crate::profile::Options;
 use crate::syntax::{Command, Mnemonic, Syntax};
-use crate::{Page, Profile, Reading, Summary, Wrappers};
+use crate::{Document, Page, Profile, Summary, Wrappers};
 use characters::Characters;
 use fill::FillType;
 use frame::Frame;
@@ -32,7 +32,7 @@ use ticks::Ticks;
 use tracer::Tracer;
 
 /// Gives the commands of a file their meaning.
-pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Reading {
+pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Document {
     let mut interpreter = Interpreter::new(options, syntax.bytes.len());
     let mut findings = syntax.findings.clone();
     let mut placed = 0;
@@ -359,7 +359,7 @@ impl Interpreter {
         commands: usize,
         wrappers: Wrappers,
         syntax_findings: Findings,
-    ) -> Reading {
+    ) -> Document {
         if self.polygon.is_open() {
             self.report(codes::OPEN_POLYGON, || "the file ends inside a polygon (PM0 without PM2)".into());
         }
@@ -384,6 +384,6 @@ impl Interpreter {
             .filter(|&(_, count)| count > 0)
             .collect();
         let summary = Summary { commands, used, wrappers, profile };
-        Reading { pages: self.pages, diagnostics, summary }
+        Document { pages: self.pages, diagnostics, summary }
     }
 }

@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
 }
 
 /// What there is to say about a file of HP-GL, but for its drawing.
-fn language(input: &Input, reading: &hpgl::Reading) -> String {
+fn language(input: &Input, reading: &hpgl::Document) -> String {
     let wrappers = wrappers(reading.summary.wrappers);
     let mut text = format!("dialect  {}{wrappers}\n", generation(reading.summary.generation()));
     let producer =
