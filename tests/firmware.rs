@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use assert_cmd::cargo::cargo_bin;
+use backends::Ink;
+use backends::device::{Device, Ebb, Grbl};
+use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::{Affine, Drawing, Rect};
 use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar};
 use plan::{Header, Limits, Row, TickTable};
-use plotplan::machine_file::{MachineFile, PRESETS};
-use sending::Ink;
-use sending::device::{Device, Ebb, Grbl};
 use serde_json::Value;
 use verify::{Certificate, Verifier};
 
@@ -48,7 +48,7 @@ fn convert(file: &str, machine: &str, format: &str, options: &[&str]) -> String 
 
 fn plan(file: &str, machine: &str, options: &[&str]) -> TickTable {
     let csv = convert(file, machine, "csv", options);
-    formats::read_plan(csv.as_bytes()).expect("a plan").table
+    plan::file::read(csv.as_bytes()).expect("a plan").table
 }
 
 /// The drawing where the plan puts it.

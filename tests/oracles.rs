@@ -1,9 +1,9 @@
 //! The presets against the equations of the four reports that they come from, written down here from the reports and not
 //! from our kinematics: positions, counts, start poses, and a listing's own points.
 
+use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::Point;
 use kinematics::{Joints, Machine};
-use plotplan::machine_file::{MachineFile, PRESETS};
 
 fn preset(name: &str) -> Machine {
     let preset = PRESETS.iter().find(|preset| preset.name == name).expect("a preset of this name");

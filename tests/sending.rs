@@ -9,10 +9,10 @@ use std::thread;
 use std::time::Duration;
 
 use assert_cmd::cargo::cargo_bin;
+use backends::Ink;
+use compiler::machine_file::{MachineFile, PRESETS};
 use kinematics::{Joints, Machine};
 use plan::TickTable;
-use plotplan::machine_file::{MachineFile, PRESETS};
-use sending::Ink;
 use tempfile::TempDir;
 
 /// A corner, a circle, a dot.
@@ -55,7 +55,7 @@ impl Desk {
     }
 
     fn plan(&self) -> TickTable {
-        formats::read_plan(&std::fs::read(self.path("plan.ticks")).expect("a plan")).expect("a plan").table
+        plan::file::read(&std::fs::read(self.path("plan.ticks")).expect("a plan")).expect("a plan").table
     }
 
     /// Starts a machine; its port is `name`.

@@ -14,22 +14,36 @@ const MAY_KNOW: &[(&str, &[&str])] = &[
     ("kinematics", &["drawing"]),
     ("planner", &["drawing", "kinematics", "plan"]),
     ("verify", &["drawing", "kinematics", "plan"]),
-    ("formats", &["drawing", "plan"]),
-    ("sending", &["drawing", "formats", "plan"]),
+    ("picture", &["drawing", "plan"]),
+    ("backends", &["drawing", "kinematics", "plan"]),
+    ("compiler", &["drawing", "hpgl", "kinematics", "ordering", "plan", "planner", "verify"]),
     (
         "plotplan",
-        &["drawing", "formats", "hpgl", "kinematics", "ordering", "plan", "planner", "sending", "verify"],
+        &[
+            "backends",
+            "compiler",
+            "drawing",
+            "hpgl",
+            "kinematics",
+            "ordering",
+            "picture",
+            "plan",
+            "planner",
+            "verify",
+        ],
     ),
-    ("xtask", &["drawing", "formats", "hpgl", "kinematics", "plan", "planner"]),
+    ("xtask", &["drawing", "hpgl", "kinematics", "plan", "planner"]),
 ];
 
 /// Outside crates that only some may use: the command line's, and formats' serialisation.
 const RESERVED: &[(&str, &[&str])] = &[
     ("anyhow", &["plotplan", "xtask"]),
     ("clap", &["plotplan"]),
-    ("toml", &["plotplan", "xtask"]),
-    ("serde", &["formats", "plotplan"]),
-    ("serde_json", &["formats", "plotplan", "xtask"]),
+    ("serialport", &["plotplan"]),
+    ("indicatif", &["plotplan"]),
+    ("toml", &["compiler", "xtask"]),
+    ("serde", &["backends", "compiler", "plan", "plotplan"]),
+    ("serde_json", &["backends", "compiler", "plan", "plotplan", "xtask"]),
 ];
 
 /// Paths of a machine have no business in the repository.

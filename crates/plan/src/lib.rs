@@ -2,7 +2,27 @@
 //!
 //! This is what the planner hands over, the verifier replays and the formats write. It knows neither machines nor
 //! drawings nor files. Every machine of plotplan moves a pen in a plane with as many motors as the plane has
-//! dimensions, so a row holds two motor positions.
+//! dimensions, so a row holds two motor positions. [`file`] reads and writes plans.
+//!
+//! ```
+//! use plan::{Header, Limits, Motor, Row, file};
+//!
+//! let limits = Limits { speed: 533.3, acceleration: 2666.7, jerk: None };
+//! let motors = ["arm1", "arm2"].map(|name| Motor { name: name.to_owned(), limits });
+//! let placement = [1.0, 0.0, 0.0, 1.0, 12.7, 76.2];
+//! let header =
+//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, lift_overlap_us: 0, rows: 2, duration_us: 10_000 };
+//! let rows = [Row { t_us: 0, pen: 0, ticks: [800, 0] }, Row { t_us: 10_000, pen: 0, ticks: [801, -1] }];
+//!
+//! let mut bytes = Vec::new();
+//! file::tick_lines::write(&header, rows, &mut bytes)?;
+//! let read = file::read(&bytes)?;
+//! assert_eq!(read.table.header, header);
+//! assert_eq!(read.table.rows, rows);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod file;
 
 /// How many motors move the pen: as many as the plane has dimensions, since the coupling is invertible.
 pub const MOTORS: usize = 2;

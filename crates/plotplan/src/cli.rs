@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use plotplan::quantity;
+use compiler::quantity;
 
 /// Compiles pen-plotter drawings (HPGL, HP-GL/2) to motor motion.
 ///
@@ -329,7 +329,7 @@ pub(crate) struct Device {
     pub(crate) machine: Option<String>,
     /// What goes wrong: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N
     #[arg(long, value_name = "FAULT", value_parser = fault)]
-    pub(crate) fault: Vec<sending::device::Fault>,
+    pub(crate) fault: Vec<backends::device::Fault>,
     /// How many times faster than the clock it lives
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     pub(crate) haste: f64,
@@ -488,8 +488,8 @@ fn positions(text: &str) -> Result<(i16, i16), String> {
 }
 
 #[cfg(unix)]
-fn fault(text: &str) -> Result<sending::device::Fault, String> {
-    use sending::device::Fault;
+fn fault(text: &str) -> Result<backends::device::Fault, String> {
+    use backends::device::Fault;
     let what = "a fault is KIND=N or KIND=N:TIME, such as lost-answer=5 or unplugged=2s:1s";
     let (kind, value) = text.split_once('=').ok_or(what)?;
     let (first, second) = value.split_once(':').map_or((value, None), |(a, b)| (a, Some(b)));

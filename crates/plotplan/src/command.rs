@@ -15,12 +15,12 @@ mod verify;
 use std::fmt::Write as _;
 
 use clap::CommandFactory as _;
+use compiler::pipeline::{Order, Request};
 use drawing::Pen;
 use hpgl::{Page, PenSettings};
 use kinematics::Machine;
 use planner::placement::{Size, Wish};
 use planner::{Ease, Law};
-use plotplan::pipeline::{Order, Request};
 
 use crate::cli::{self, Arguments, Command, Planning};
 use crate::failure::Failure;

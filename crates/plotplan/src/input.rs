@@ -4,10 +4,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use compiler::machine_file::{MachineFile, PRESETS, nearest};
 use drawing::Drawing;
 use hpgl::{Document, Severity};
 use kinematics::Machine;
-use plotplan::machine_file::{MachineFile, PRESETS, nearest};
 
 use crate::cli;
 use crate::failure::Failure;
@@ -64,8 +64,8 @@ pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<Drawn, 
         Some(plotter) => hpgl::Options::for_plotter(plotter, arguments.paper.as_deref())
             .ok_or_else(|| Failure::Usage(unknown_plotter(plotter, arguments.paper.as_deref())))?,
     };
-    let reading = if formats::points::looks_like_points(&input.bytes) {
-        let drawing = formats::points::read(&input.bytes);
+    let reading = if compiler::import::points::looks_like_points(&input.bytes) {
+        let drawing = compiler::import::points::read(&input.bytes);
         let page = hpgl::Page { drawing, ..hpgl::Page::default() };
         Document { pages: vec![page], diagnostics: Vec::new(), ..hpgl::read(b"", &options) }
     } else {

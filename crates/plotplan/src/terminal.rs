@@ -4,10 +4,10 @@ use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use compiler::pipeline::Step;
 use drawing::Span;
 use hpgl::{Diagnostic, Severity};
 use indicatif::{ProgressBar, ProgressStyle};
-use plotplan::pipeline::Step;
 
 use crate::cli::MessageFormat;
 use crate::input::Input;
@@ -236,14 +236,14 @@ impl SendingProgress {
         Self { bar }
     }
 
-    pub(crate) fn show(&self, progress: &sending::Progress) {
+    pub(crate) fn show(&self, progress: &backends::Progress) {
         if self.bar.is_hidden() {
             return;
         }
         let left = progress.of_us.saturating_sub(progress.done_us) as f64 * 1e-6;
         self.bar.set_length(progress.of_us / 1000);
         self.bar.set_position(progress.done_us / 1000);
-        let left = plotplan::report::clock(left);
+        let left = compiler::report::clock(left);
         self.bar.set_message(format!("line {} of {}, {left} left", progress.lines, progress.of_lines));
     }
 

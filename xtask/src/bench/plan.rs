@@ -316,7 +316,7 @@ fn emission_seconds(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f6
         duration_us: trajectory.duration_us(),
     };
     let rows = || trajectory.rows().map(|row| row.row);
-    let (written, seconds) = fastest(|| formats::csv::write(&header, rows(), &mut std::io::sink()));
+    let (written, seconds) = fastest(|| plan::file::csv::write(&header, rows(), &mut std::io::sink()));
     written?;
     Ok(seconds)
 }

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
+use compiler::report::{counted, metres};
 use hpgl::Severity;
 use planner::placement;
-use plotplan::report::{counted, metres};
 
 use crate::cli::Check;
 use crate::failure::Failure;

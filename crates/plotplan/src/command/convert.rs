@@ -1,16 +1,13 @@
 //! `plotplan convert`: a drawing into a plan, or into a clean drawing.
 
-use std::fmt::Write as _;
-
 use annotate_snippets::Level;
+use compiler::pipeline::{self, Compiled, Request};
+use compiler::report;
 use drawing::Drawing;
 use kinematics::Machine;
 use planner::PlanError;
 use planner::placement::{Size, Wish, place};
-use plotplan::pipeline::{self, Compiled, Request};
-use plotplan::report;
 use serde_json::json;
-use sha2::Digest as _;
 
 use crate::cli::{Convert, Format, ReportForm};
 use crate::failure::Failure;
@@ -29,7 +26,7 @@ pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
         }
     };
     let input = input::read(&arguments.file)?;
-    if formats::looks_like_plan(&input.bytes) {
+    if plan::file::is_plan(&input.bytes) {
         let what = format!("{} is a plan already; convert takes a drawing", input.name);
         return Err(Failure::Drawing(anyhow::anyhow!(what)));
     }
@@ -52,7 +49,7 @@ fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> 
         if arguments.hpgl2 { hpgl::Encoding::Base64 } else { hpgl::EmitOptions::default().encoding };
     let options = hpgl::EmitOptions { encoding, ..hpgl::EmitOptions::default() };
     output::write(&arguments.output, |out| match arguments.format {
-        Format::Svg => formats::svg::write(drawing, out),
+        Format::Svg => picture::svg::write(drawing, out),
         _ => out.write_all(&hpgl::emit(drawing, &options)),
     })
 }
@@ -104,21 +101,24 @@ fn plan(
     let rows = || compiled.trajectory.rows().map(|row| row.row);
     output::write(&arguments.output, |out| {
         let written = match arguments.format {
-            Format::Csv => formats::csv::write(&compiled.header, rows(), out),
+            Format::Csv => plan::file::csv::write(&compiled.header, rows(), out),
             Format::Json => {
-                let document = formats::json::Document {
-                    source: formats::json::Source { name: input.name.clone(), sha256: sha256(&input.bytes) },
+                let document = plan::file::json::Document {
+                    source: plan::file::json::Source {
+                        name: input.name.clone(),
+                        sha256: compiler::import::sha256(&input.bytes),
+                    },
                     machine: serde_json::to_value(&machine.file)?,
                     settings: report::settings(&request),
                     summary,
                     certificate,
                 };
-                formats::json::write(&document, &compiled.header, rows, out)
+                plan::file::json::write(&document, &compiled.header, rows, out)
             }
-            _ => formats::ticks::write(&compiled.header, rows(), out),
+            _ => plan::file::tick_lines::write(&compiled.header, rows(), out),
         };
         written.map_err(|error| match error {
-            formats::WriteError::Io(error) => error,
+            plan::file::WriteError::Io(error) => error,
             other => std::io::Error::other(other),
         })
     })?;
@@ -180,11 +180,4 @@ pub(super) fn explain(
     let title = format!("the drawing leaves the reach of {}: {source}", machine.name());
     terminal::at_place(input, *span, Level::ERROR, None, &title, &place_text, Some(&help));
     Failure::Refused
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    sha2::Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }

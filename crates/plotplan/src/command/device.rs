@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use backends::device::{Device as Machine, Ebb, Faulty, Grbl, Ticks, XyPlotter};
+use compiler::pipeline;
 use drawing::{Point, Rect};
-use formats::{Ink, Scene};
 use kinematics::Joints;
-use plotplan::pipeline;
-use sending::device::{Device as Machine, Ebb, Faulty, Grbl, Ticks, XyPlotter};
+use picture::{Ink, Scene};
 
 use crate::cli::{Device, DeviceProtocol};
 use crate::failure::Failure;
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Device) -> Result<(), Failure> {
     }
     if let Some(to) = &arguments.svg {
         let scene = scene(arguments, machine.as_ref(), faulty.device().ink());
-        output::write(to, |out| formats::preview::svg(&scene, out))?;
+        output::write(to, |out| picture::scene::svg(&scene, out))?;
     }
     Ok(())
 }
@@ -135,7 +135,7 @@ fn serve(arguments: &Device, faulty: &mut Faulty, ended: &AtomicBool) -> anyhow:
 }
 
 /// One line a place: number of the line of ink, pen, place.
-fn write_ink(ink: &sending::Ink, out: &mut dyn std::io::Write) -> std::io::Result<()> {
+fn write_ink(ink: &backends::Ink, out: &mut dyn std::io::Write) -> std::io::Result<()> {
     writeln!(out, "line,pen,x,y")?;
     for (line, (pen, places)) in ink.lines().iter().enumerate() {
         for [x, y] in places {
@@ -146,7 +146,7 @@ fn write_ink(ink: &sending::Ink, out: &mut dyn std::io::Write) -> std::io::Resul
 }
 
 /// The ink as a picture. Motors' positions are led through the machine's kinematics where it is known.
-fn scene(arguments: &Device, machine: Option<&LoadedMachine>, ink: &sending::Ink) -> Scene {
+fn scene(arguments: &Device, machine: Option<&LoadedMachine>, ink: &backends::Ink) -> Scene {
     let in_ticks = matches!(arguments.protocol, DeviceProtocol::Ticks | DeviceProtocol::Ebb);
     let machine = machine.filter(|_| in_ticks);
     // An EBB counts from where its motors were switched on.

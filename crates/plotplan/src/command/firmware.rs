@@ -1,10 +1,10 @@
 //! The formats of firmwares: what each can carry of a plan, and what is lost is said.
 
+use backends::{Instant, WriteError, ebb, gcode};
+use compiler::pipeline::Compiled;
 use drawing::{Pen, Point};
-use formats::{Instant, WriteError, ebb, gcode};
 use kinematics::{Geometry, Joints, Machine};
 use planner::ExactRow;
-use plotplan::pipeline::Compiled;
 
 use crate::cli::{Convert, Format, PenBy, PenLift};
 use crate::failure::Failure;
@@ -59,33 +59,33 @@ fn put(
     let instants = || compiled.trajectory.rows().map(|ExactRow { row, exact }| instant(machine, row, exact));
     let names = machine.motors().each_ref().map(|motor| motor.name.as_str());
     match arguments.format {
-        Format::CoaxialCommands => formats::coaxial_commands::write(instants(), out),
+        Format::CoaxialCommands => backends::coaxial_commands::write(instants(), out),
         Format::CoaxialCommandsInches => {
             let sheet = machine.sheet();
-            formats::coaxial_commands::write_inches(instants(), Point::new(sheet.x0, sheet.y1), out)
+            backends::coaxial_commands::write_inches(instants(), Point::new(sheet.x0, sheet.y1), out)
         }
-        Format::XySerial => formats::xy_serial::write(instants(), out),
-        Format::PolarCsv => formats::polar_csv::write(instants(), out),
-        Format::CArrays => formats::c_arrays::write(instants(), out),
+        Format::XySerial => backends::xy_serial::write(instants(), out),
+        Format::PolarCsv => backends::polar_csv::write(instants(), out),
+        Format::CArrays => backends::c_arrays::write(instants(), out),
         Format::Ebb => ebb::write(rows(), ebb::Moves::Timed, ebb_pen(arguments.pen), out),
         Format::EbbSm => ebb::write(rows(), ebb::Moves::Stepper, ebb_pen(arguments.pen), out),
         Format::GcodeTimed => {
             let options = gcode_options(gcode::Flavour::Grbl, machine, arguments.pen);
             gcode::write(&gcode::timed(instants(), &options, true), out)
         }
-        Format::KlipperSteps => formats::klipper_steps::write(rows(), out),
+        Format::KlipperSteps => backends::klipper_steps::write(rows(), out),
         Format::JointTrajectory => {
             let instants: Vec<Instant> = instants().collect();
             let geometry = machine.geometry();
-            formats::joint_trajectory::write(
+            backends::joint_trajectory::write(
                 &instants,
                 geometry.joint_names(),
                 geometry.joint_is_angle(),
                 out,
             )
         }
-        Format::Halstreamer => formats::halstreamer::write(instants(), compiled.header.period_us, out),
-        Format::Pvt => formats::pvt::write(&instants().collect::<Vec<_>>(), names, out),
+        Format::Halstreamer => backends::halstreamer::write(instants(), compiled.header.period_us, out),
+        Format::Pvt => backends::pvt::write(&instants().collect::<Vec<_>>(), names, out),
         other => {
             let options = gcode_options(flavour(other), machine, arguments.pen);
             let speeds = stroke_speeds(machine, compiled);

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use compiler::report::{self, clock, counted, metres};
 use hpgl::{Code, Generation, Profile, ProfileReason, Wrappers};
-use plotplan::report::{self, clock, counted, metres};
 
 use crate::cli::Info;
 use crate::failure::Failure;
@@ -16,7 +16,7 @@ const TOLERANCE_MM: f64 = 1.0;
 
 pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
     let input = input::read(&arguments.file)?;
-    let text = if formats::looks_like_plan(&input.bytes) {
+    let text = if plan::file::is_plan(&input.bytes) {
         of_plan(&input, arguments.machine.as_deref())?
     } else {
         of_drawing(&input, arguments)?
@@ -43,7 +43,7 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     let drawn = input::drawing(input, &arguments.reading)?;
     let reading = &drawn.reading;
     let mut text = format!("drawing  {}\n", input.name);
-    if formats::points::looks_like_points(&input.bytes) {
+    if compiler::import::points::looks_like_points(&input.bytes) {
         text.push_str("dialect  points <x, y>, mm\n");
     } else {
         text.push_str(&language(input, reading));

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use compiler::machine_file::PRESETS;
 use drawing::{Line, Point, Segment};
-use plotplan::machine_file::PRESETS;
 
 use crate::cli::Machine;
 use crate::failure::Failure;

@@ -1,8 +1,8 @@
 //! Where a plan's rows take the pen.
 
 use drawing::{Drawing, Pen, Point, Span, Stroke};
-use formats::Ink;
 use kinematics::{Joints, Machine};
+use picture::Ink;
 use plan::Row;
 
 /// The pen's ways over the paper, machine mm.

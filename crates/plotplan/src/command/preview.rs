@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use compiler::pipeline;
 use drawing::{Drawing, Point, Rect};
-use formats::{Ink, Scene};
-use plotplan::pipeline;
+use picture::{Ink, Scene};
 
 use super::motion::Motion;
 use crate::cli::Preview;
@@ -28,16 +28,16 @@ pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
         }
     };
     let input = input::read(&arguments.file)?;
-    let scene = if formats::looks_like_plan(&input.bytes) {
+    let scene = if plan::file::is_plan(&input.bytes) {
         of_plan(&input, arguments.machine.as_deref())?
     } else {
         of_drawing(&input, arguments)?
     };
     if png {
-        let bytes = formats::png::encode(&scene, PIXELS).map_err(|error| Failure::Drawing(error.into()))?;
+        let bytes = picture::png::encode(&scene, PIXELS).map_err(|error| Failure::Drawing(error.into()))?;
         output::write(&arguments.output, |out| out.write_all(&bytes))
     } else {
-        output::write(&arguments.output, |out| formats::preview::svg(&scene, out))
+        output::write(&arguments.output, |out| picture::scene::svg(&scene, out))
     }
 }
 

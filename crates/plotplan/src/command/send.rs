@@ -5,13 +5,13 @@ use std::io::Write as _;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use formats::{ebb, gcode};
-use sending::asking::Asking;
-use sending::blind::Blind;
-use sending::locating::{Located, Locating};
-use sending::numbered::Numbered;
-use sending::repeating::Repeating;
-use sending::{Conversation, Dialect, Outcome, Script};
+use backends::asking::Asking;
+use backends::blind::Blind;
+use backends::locating::{Located, Locating};
+use backends::numbered::Numbered;
+use backends::repeating::Repeating;
+use backends::{Conversation, Dialect, Outcome, Script};
+use backends::{ebb, gcode};
 use serialport::FlowControl;
 
 use super::firmware;
@@ -87,7 +87,7 @@ fn warn_of_pens(protocol: Protocol, input: &Input) {
         }
         Protocol::Gcode => "the machine pauses (M0) where the pen is to be changed",
     };
-    let Ok(plan) = formats::read_plan(&input.bytes) else { return };
+    let Ok(plan) = plan::file::read(&input.bytes) else { return };
     let pens: std::collections::BTreeSet<u16> = plan.table.rows.iter().map(|row| row.pen).collect();
     let pens: Vec<String> = pens.into_iter().filter(|pen| *pen != 0).map(|pen| pen.to_string()).collect();
     if pens.len() > 1 {
@@ -104,8 +104,8 @@ fn started(arguments: &Send, script: &Script) -> Result<Script, Failure> {
 /// What is to be said: the lines of a plan, or those of a file in the machine's own words.
 fn script(arguments: &Send, input: &Input) -> Result<Script, Failure> {
     let wrong = |what: String| Failure::Drawing(anyhow::anyhow!(what));
-    let unfit = |error: sending::ScriptError| Failure::Drawing(anyhow::Error::new(error));
-    if !formats::looks_like_plan(&input.bytes) {
+    let unfit = |error: backends::ScriptError| Failure::Drawing(anyhow::Error::new(error));
+    if !plan::file::is_plan(&input.bytes) {
         let text = String::from_utf8_lossy(&input.bytes);
         return match arguments.protocol {
             Protocol::Gcode => Ok(Script::of_lines(Dialect::Gcode, &text)),
@@ -119,7 +119,7 @@ fn script(arguments: &Send, input: &Input) -> Result<Script, Failure> {
     }
     let with_machine = || super::verify::plan(input, arguments.machine.as_deref());
     let plan_alone = || {
-        formats::read_plan(&input.bytes)
+        plan::file::read(&input.bytes)
             .with_context(|| format!("{} is not a plan that can be used", input.name))
             .map_err(Failure::Drawing)
     };
@@ -237,7 +237,7 @@ impl Wire {
 
     /// The rest of the script from `row` on, or from where the machine says it is, if that is a little further.
     fn go_on(&mut self, script: &Script, row: u64) -> Result<Script, Failure> {
-        let usage = |error: sending::ScriptError| Failure::Usage(error.into());
+        let usage = |error: backends::ScriptError| Failure::Usage(error.into());
         // A row that there is not is no reason to ask anybody.
         script.from_row(row, None).map_err(usage)?;
         let start = script.start();
@@ -311,7 +311,7 @@ impl Wire {
                 if self.look_again() {
                     conversation.reconnected(self.now_us());
                 } else if now().duration_since(lost_at).as_secs_f64() > reconnect_s {
-                    let sending::Progress { row, at_most, .. } = conversation.progress();
+                    let backends::Progress { row, at_most, .. } = conversation.progress();
                     let why = format!("{} has gone away", self.settings.path);
                     break Outcome::Failed { row, at_most, why };
                 }
@@ -347,7 +347,7 @@ impl Wire {
                 Some(Event::Interrupted) => {
                     interrupts += 1;
                     if interrupts > 1 {
-                        let sending::Progress { row, at_most, .. } = conversation.progress();
+                        let backends::Progress { row, at_most, .. } = conversation.progress();
                         let why = "interrupted again before the machine was at rest".to_owned();
                         break Outcome::Failed { row, at_most, why };
                     }

@@ -1,11 +1,11 @@
 //! `plotplan verify`: the certificate, recomputed from the plan's ticks.
 
 use anyhow::Context as _;
+use compiler::machine_file::MachineFile;
+use compiler::report;
 use drawing::{Affine, Drawing};
-use formats::PlanFile;
 use kinematics::Machine;
-use plotplan::machine_file::MachineFile;
-use plotplan::report;
+use plan::file::PlanFile;
 use serde_json::{Value, json};
 use verify::Certificate;
 
@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
 /// Reads a plan and finds its machine: the one named on the command line, the one in the plan document, or the preset of
 /// its name.
 pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, LoadedMachine), Failure> {
-    let plan = formats::read_plan(&input.bytes)
+    let plan = plan::file::read(&input.bytes)
         .with_context(|| format!("{} is not a plan that can be used", input.name))
         .map_err(Failure::Drawing)?;
     let machine = match (machine, &plan.document) {

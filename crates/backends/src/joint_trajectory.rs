@@ -1,0 +1,63 @@
+//! A ROS `trajectory_msgs/JointTrajectory` as JSON: positions, velocities and accelerations of the joints at each row.
+//!
+//! A controller interpolates with quintics when it has all three. Angles are rad, lengths metres (REP 103); the pen is a third
+//! joint that is 0 up and 1 down. Velocities and accelerations are central differences of the positions before
+//! rounding, and 0 where the joints rest.
+
+use std::io::Write;
+
+use crate::WriteError;
+use crate::command::{Instant, rests};
+use plan::file::text::Text;
+
+/// Writes a plan. `names` are the joints', `angles` tells which of them are angles.
+///
+/// # Errors
+/// Whatever the writer says.
+pub fn write<W: Write + ?Sized>(
+    instants: &[Instant],
+    names: [&str; 2],
+    angles: [bool; 2],
+    out: &mut W,
+) -> Result<(), WriteError> {
+    let mut text = Text::new(out);
+    text.str(
+        "{\"header\": {\"stamp\": {\"sec\": 0, \"nanosec\": 0}, \"frame_id\": \"\"},\n\"joint_names\": [\"",
+    );
+    text.str(names[0]).str("\", \"").str(names[1]).str("\", \"pen\"],\n\"points\": [");
+    let unit = angles.map(|angle| if angle { 1.0 } else { 1e-3 });
+    let at = |k: usize, joint: usize| instants[k].joints[joint] * unit[joint];
+    for (k, instant) in instants.iter().enumerate() {
+        let (mut velocity, mut acceleration) = ([0.0; 2], [0.0; 2]);
+        if k > 0 && k + 1 < instants.len() {
+            let gap = |a: usize, b: usize| (instants[b].row.t_us - instants[a].row.t_us) as f64 * 1e-6;
+            let (before, after) = (gap(k - 1, k), gap(k, k + 1));
+            for joint in 0..2 {
+                let slopes =
+                    [(at(k, joint) - at(k - 1, joint)) / before, (at(k + 1, joint) - at(k, joint)) / after];
+                if !rests(&instants[k - 1], instant) && !rests(instant, &instants[k + 1]) {
+                    velocity[joint] = (before * slopes[1] + after * slopes[0]) / (before + after);
+                    acceleration[joint] = 2.0 * (slopes[1] - slopes[0]) / (before + after);
+                }
+            }
+        }
+        text.str(if k == 0 { "\n" } else { ",\n" }).str("{\"positions\": [");
+        let down = f64::from(u8::from(instant.row.pen != 0));
+        triple(&mut text, [at(k, 0), at(k, 1), down]);
+        text.str("], \"velocities\": [");
+        triple(&mut text, [velocity[0], velocity[1], 0.0]);
+        text.str("], \"accelerations\": [");
+        triple(&mut text, [acceleration[0], acceleration[1], 0.0]);
+        text.str("], \"time_from_start\": {\"sec\": ").int(instant.row.t_us / 1_000_000);
+        text.str(", \"nanosec\": ").int(instant.row.t_us % 1_000_000 * 1000).str("}}").flush_if_full()?;
+    }
+    text.str("\n]}\n");
+    Ok(text.finish()?)
+}
+
+/// To a nanometre or a nanoradian.
+fn triple<W: Write + ?Sized>(text: &mut Text<'_, W>, values: [f64; 3]) {
+    for (index, value) in values.into_iter().enumerate() {
+        text.str(if index == 0 { "" } else { ", " }).float((value * 1e9).round() / 1e9);
+    }
+}

@@ -1,0 +1,200 @@
+//! A picture of a drawing or a plan on its machine: sheet, reach, ink by pen, travel, start.
+
+use std::io::{self, Write};
+
+use drawing::{Point, Rect};
+
+use crate::palette::{Colour, hex, pen_colour};
+use crate::svg::{point, polyline, view_box};
+use plan::file::text::Text;
+
+pub(crate) const REACH_FILL: Colour = [0xEE, 0xF3, 0xF8];
+pub(crate) const REACH_LINE: Colour = [0xA9, 0xB9, 0xC9];
+pub(crate) const SHEET_LINE: Colour = [0x55, 0x55, 0x55];
+pub(crate) const TRAVEL: Colour = [0x8C, 0x8C, 0x8C];
+pub(crate) const START: Colour = [0xB0, 0x00, 0x20];
+
+/// Widths and lengths in mm, for a page of any size: ink is as wide as a pen's, the rest is thinner.
+pub(crate) const INK_MM: f64 = 0.3;
+pub(crate) const OUTLINE_MM: f64 = 0.25;
+pub(crate) const TRAVEL_MM: f64 = 0.12;
+pub(crate) const DASH_MM: f64 = 1.0;
+
+/// What a picture shows, in mm of the machine's frame, y up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// What the picture is of.
+    pub title: String,
+    /// The sheet of paper.
+    pub sheet: Rect,
+    /// Closed outlines of where the pen can go; what is inside an odd number of them can be reached.
+    pub reach: Vec<Vec<Point>>,
+    /// What is drawn, in its order.
+    pub ink: Vec<Ink>,
+    /// The ways with the pen up.
+    pub travel: Vec<Vec<Point>>,
+    /// Where the pen starts.
+    pub start: Option<Point>,
+}
+
+/// One connected line of ink.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ink {
+    /// The pen's number, 1 and up.
+    pub pen: u16,
+    /// Its points, mm; a single point is a dot.
+    pub points: Vec<Point>,
+}
+
+impl Scene {
+    /// The pens that draw, each once, in the order of their numbers.
+    pub fn pens(&self) -> Vec<u16> {
+        let mut pens: Vec<u16> = self.ink.iter().map(|ink| ink.pen).collect();
+        pens.sort_unstable();
+        pens.dedup();
+        pens
+    }
+
+    /// The smallest upright rectangle that holds sheet, ink, travel and start, mm, and a margin; points that are not finite
+    /// aside. The reach of an arm may go far beyond: what of it lies outside is not shown.
+    pub fn bounds(&self) -> Rect {
+        let lines = self.travel.iter().chain(self.ink.iter().map(|ink| &ink.points));
+        let points = lines.flatten().chain(&self.start).filter(|point| point.is_finite());
+        let bounds = points.fold(self.sheet.abs(), |bounds, &point| bounds.union_pt(point));
+        let margin = 1.0 + 0.02 * bounds.width().max(bounds.height());
+        bounds.inflate(margin, margin)
+    }
+}
+
+/// Writes the picture as SVG: one unit is one mm, y is the machine's negated, and a legend stands below.
+///
+/// # Errors
+/// Whatever the writer says.
+pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
+    let mut text = Text::new(out);
+    let bounds = scene.bounds();
+    let legend = Legend::of(scene, bounds);
+    text.str("<svg xmlns=\"http://www.w3.org/2000/svg\"");
+    let page = Rect { y0: bounds.y0 - legend.height_mm(), ..bounds };
+    view_box(&mut text, page);
+    text.str(" fill=\"none\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n<title>");
+    escaped(&mut text, &scene.title);
+    text.str("</title>\n<rect");
+    rectangle(&mut text, page);
+    text.str(" fill=\"#ffffff\"/>\n");
+
+    text.str("<path id=\"reach\" fill-rule=\"evenodd\" fill=\"").str(&hex(REACH_FILL));
+    text.str("\" stroke=\"").str(&hex(REACH_LINE)).str("\" stroke-width=\"").fixed(OUTLINE_MM).str("\" d=\"");
+    for outline in scene.reach.iter().filter(|outline| !outline.is_empty()) {
+        polyline(&mut text, outline)?;
+        text.byte(b'Z');
+    }
+    text.str("\"/>\n<rect id=\"sheet\"");
+    rectangle(&mut text, scene.sheet.abs());
+    text.str(" stroke=\"").str(&hex(SHEET_LINE)).str("\" stroke-width=\"").fixed(OUTLINE_MM).str("\"/>\n");
+
+    text.str("<path id=\"travel\" stroke=\"").str(&hex(TRAVEL)).str("\" stroke-width=\"").fixed(TRAVEL_MM);
+    text.str("\" stroke-dasharray=\"").fixed(DASH_MM).str("\" d=\"");
+    for travel in &scene.travel {
+        polyline(&mut text, travel)?;
+    }
+    text.str("\"/>\n");
+    for pen in scene.pens() {
+        text.str("<g id=\"pen").int(pen).str("\" stroke=\"").str(&hex(pen_colour(pen)));
+        text.str("\" stroke-width=\"").fixed(INK_MM).str("\">\n");
+        for ink in scene.ink.iter().filter(|ink| ink.pen == pen && !ink.points.is_empty()) {
+            text.str("<path d=\"");
+            polyline(&mut text, &ink.points)?;
+            text.str("\"/>\n").flush_if_full()?;
+        }
+        text.str("</g>\n");
+    }
+    if let Some(start) = scene.start {
+        text.str("<path id=\"start\" stroke=\"").str(&hex(START)).str("\" stroke-width=\"").fixed(OUTLINE_MM);
+        text.str("\" d=\"");
+        cross(&mut text, start, 0.5 * legend.size_mm);
+        text.str("\"/>\n");
+    }
+    legend.write(&mut text, scene, bounds);
+    text.str("</svg>\n");
+    text.finish()
+}
+
+/// Text below the picture: the title, the sheet's size, and the pens with their colours.
+struct Legend {
+    size_mm: f64,
+    pens_a_line: usize,
+    lines: usize,
+}
+
+impl Legend {
+    fn of(scene: &Scene, bounds: Rect) -> Self {
+        let size_mm = bounds.width().max(bounds.height()) / 60.0;
+        // A pen's entry is six letters wide with its line of colour.
+        let pens_a_line = (bounds.width() / (6.0 * size_mm)).floor().max(1.0) as usize;
+        Self { size_mm, pens_a_line, lines: 2 + scene.pens().len().div_ceil(pens_a_line) }
+    }
+
+    fn height_mm(&self) -> f64 {
+        (self.lines as f64 + 0.5) * 1.4 * self.size_mm
+    }
+
+    fn write<W: Write + ?Sized>(&self, text: &mut Text<'_, W>, scene: &Scene, bounds: Rect) {
+        let line = |index: usize| bounds.y0 - 1.4 * self.size_mm * index as f64;
+        text.str("<g id=\"legend\" fill=\"#333333\" font-family=\"sans-serif\" font-size=\"")
+            .fixed(self.size_mm);
+        text.str("\">\n");
+        let left = bounds.x0 + self.size_mm;
+        label(text, Point::new(left, line(1)));
+        escaped(text, &scene.title);
+        text.str("</text>\n");
+        label(text, Point::new(left, line(2)));
+        let tenths = |length: f64| (length * 10.0).round() / 10.0;
+        text.str("sheet ").float(tenths(scene.sheet.width().abs())).str(" x ");
+        text.float(tenths(scene.sheet.height().abs())).str(" mm</text>\n");
+        for (index, pen) in scene.pens().into_iter().enumerate() {
+            let at = Point::new(
+                left + 6.0 * self.size_mm * (index % self.pens_a_line) as f64,
+                line(3 + index / self.pens_a_line),
+            );
+            text.str("<path stroke=\"").str(&hex(pen_colour(pen))).str("\" stroke-width=\"");
+            text.fixed(0.3 * self.size_mm).str("\" d=\"M");
+            point(text, at + (0.0, 0.3 * self.size_mm));
+            text.byte(b'h').fixed(1.2 * self.size_mm).str("\"/>\n");
+            label(text, at + (1.7 * self.size_mm, 0.0));
+            text.str("pen ").int(pen).str("</text>\n");
+        }
+        text.str("</g>\n");
+    }
+}
+
+fn label<W: Write + ?Sized>(text: &mut Text<'_, W>, at: Point) {
+    text.str("<text x=\"").fixed(at.x).str("\" y=\"").fixed(-at.y).str("\">");
+}
+
+fn rectangle<W: Write + ?Sized>(text: &mut Text<'_, W>, rect: Rect) {
+    text.str(" x=\"").fixed(rect.x0).str("\" y=\"").fixed(-rect.y1);
+    text.str("\" width=\"").fixed(rect.width()).str("\" height=\"").fixed(rect.height()).byte(b'"');
+}
+
+fn cross<W: Write + ?Sized>(text: &mut Text<'_, W>, at: Point, arm_mm: f64) {
+    for direction in [(arm_mm, arm_mm), (arm_mm, -arm_mm)] {
+        text.byte(b'M');
+        point(text, at - direction);
+        text.byte(b'L');
+        point(text, at + direction);
+    }
+}
+
+/// Text for XML. Characters that XML cannot hold are left out.
+fn escaped<W: Write + ?Sized>(text: &mut Text<'_, W>, words: &str) {
+    for letter in words.chars() {
+        match letter {
+            '&' => text.str("&amp;"),
+            '<' => text.str("&lt;"),
+            '>' => text.str("&gt;"),
+            '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => text,
+            _ => text.str(letter.encode_utf8(&mut [0; 4])),
+        };
+    }
+}
