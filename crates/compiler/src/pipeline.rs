@@ -99,12 +99,12 @@ impl Compiled<'_> {
 struct TravelTime<'a>(&'a Machine);
 
 impl ordering::Cost for TravelTime<'_> {
-    fn place(&self, point: Point) -> ordering::Place {
+    fn to_cost_space(&self, point: Point) -> ordering::CostPoint {
         let pose = planner::travel_pose(self.0, point).unwrap_or(self.0.start());
         [pose.x, pose.y]
     }
 
-    fn between_places(&self, a: ordering::Place, b: ordering::Place) -> f64 {
+    fn between_cost_points(&self, a: ordering::CostPoint, b: ordering::CostPoint) -> f64 {
         planner::travel_time(self.0, &Joints::from(a), &Joints::from(b))
     }
 }

@@ -21,32 +21,32 @@ pub use report::Report;
 use search::{End, Problem};
 
 /// A point in the cost function's own terms: joints for a machine, the plane itself without one.
-pub type Place = [f64; 2];
+pub type CostPoint = [f64; 2];
 
 /// The cost of a pen-up move between two points, mm; in seconds for a machine, in millimetres without one.
 ///
 /// It must be symmetric, not negative, and the same for the same points. Any function or closure of two points is a
 /// cost. The search asks for the same points many times: where finding out what a point means is dear (inverse
-/// kinematics), a cost says so once in `place` and compares places.
+/// kinematics), a cost says so once in `to_cost_space` and compares places.
 pub trait Cost {
     /// The point in the cost's own terms.
-    fn place(&self, point: Point) -> Place;
+    fn to_cost_space(&self, point: Point) -> CostPoint;
 
     /// What the move from one place to another (or back) costs.
-    fn between_places(&self, a: Place, b: Place) -> f64;
+    fn between_cost_points(&self, a: CostPoint, b: CostPoint) -> f64;
 
     /// What the move from `a` to `b` (or back) costs.
     fn between(&self, a: Point, b: Point) -> f64 {
-        self.between_places(self.place(a), self.place(b))
+        self.between_cost_points(self.to_cost_space(a), self.to_cost_space(b))
     }
 }
 
 impl<F: Fn(Point, Point) -> f64 + Sync> Cost for F {
-    fn place(&self, point: Point) -> Place {
+    fn to_cost_space(&self, point: Point) -> CostPoint {
         [point.x, point.y]
     }
 
-    fn between_places(&self, a: Place, b: Place) -> f64 {
+    fn between_cost_points(&self, a: CostPoint, b: CostPoint) -> f64 {
         self(Point::from((a[0], a[1])), Point::from((b[0], b[1])))
     }
 }

@@ -43,7 +43,7 @@ impl<'p> Contracted<'p> {
             *entry = mate(*entry);
         }
         let ends = [strokes[0], mate(strokes[strokes.len() - 1])];
-        self.problem.place(run, ends.map(|end| self.parent.point(end)));
+        self.problem.set_ends(run, ends.map(|end| self.parent.point(end)));
         inner(strokes) - before
     }
 

@@ -2,7 +2,7 @@
 
 use drawing::Point;
 
-use crate::{Cost, Place};
+use crate::{Cost, CostPoint};
 
 /// One end of a stroke: stroke `s` has the ends `2s` and `2s + 1`, so that the other end of `e` is `e ^ 1`.
 pub(crate) type End = u32;
@@ -20,7 +20,7 @@ pub(crate) fn mate(end: End) -> End {
 pub(crate) struct Problem<'a> {
     points: Vec<Point>,
     /// The points as the cost function sees them.
-    places: Vec<Place>,
+    cost_points: Vec<CostPoint>,
     placed: [bool; 2],
     /// Strokes may not be reversed: a move goes from an odd end to an even one, never otherwise.
     pub(crate) one_way: bool,
@@ -38,22 +38,23 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let mut points = vec![park.unwrap_or_default(), start.unwrap_or_default()];
         points.extend(strokes.flatten());
-        let places = points.iter().map(|point| cost.place(*point)).collect();
-        Self { points, places, placed: [park.is_some(), start.is_some()], one_way, cost }
+        let cost_points = points.iter().map(|point| cost.to_cost_space(*point)).collect();
+        Self { points, cost_points, placed: [park.is_some(), start.is_some()], one_way, cost }
     }
 
     /// Other strokes, the same depot and cost.
     pub(crate) fn with_strokes(&self, strokes: impl Iterator<Item = [Point; 2]>) -> Self {
         let mut points = self.points[..2].to_vec();
         points.extend(strokes.flatten());
-        let places = points.iter().map(|point| self.cost.place(*point)).collect();
-        Self { points, places, ..*self }
+        let cost_points = points.iter().map(|point| self.cost.to_cost_space(*point)).collect();
+        Self { points, cost_points, ..*self }
     }
 
     /// Moves a stroke.
-    pub(crate) fn place(&mut self, stroke: usize, ends: [Point; 2]) {
+    pub(crate) fn set_ends(&mut self, stroke: usize, ends: [Point; 2]) {
         self.points[2 * stroke..2 * stroke + 2].copy_from_slice(&ends);
-        self.places[2 * stroke..2 * stroke + 2].copy_from_slice(&ends.map(|point| self.cost.place(point)));
+        self.cost_points[2 * stroke..2 * stroke + 2]
+            .copy_from_slice(&ends.map(|point| self.cost.to_cost_space(point)));
     }
 
     /// How many strokes there are, the depot included.
@@ -78,7 +79,7 @@ impl<'a> Problem<'a> {
     /// What the pen-up move between two ends costs, in the unit of the cost function.
     pub(crate) fn cost(&self, a: End, b: End) -> f64 {
         if self.is_placed(a) && self.is_placed(b) {
-            self.cost.between_places(self.places[a as usize], self.places[b as usize])
+            self.cost.between_cost_points(self.cost_points[a as usize], self.cost_points[b as usize])
         } else {
             0.0
         }
