@@ -1,4 +1,4 @@
-//! Smaller problems out of a tour: runs of strokes glued into one.
+//! Smaller problems out of a tour: runs of strokes contracted into one.
 
 use super::problem::{End, Problem, mate};
 
@@ -13,12 +13,12 @@ pub(crate) struct Contracted<'p> {
 }
 
 impl<'p> Contracted<'p> {
-    /// Cuts a tour, which begins with the depot, at its dearest links: so many in a thousand are glued.
-    pub(crate) fn new(parent: &'p Problem<'p>, tour: Vec<End>, glued: usize) -> Self {
+    /// Cuts a tour, which begins with the depot, at its dearest links: so many in a thousand are contracted.
+    pub(crate) fn new(parent: &'p Problem<'p>, tour: Vec<End>, contracted: usize) -> Self {
         let costs: Vec<f64> = tour.windows(2).map(|pair| parent.cost(mate(pair[0]), pair[1])).collect();
         let mut sorted = costs.clone();
         sorted.sort_unstable_by(f64::total_cmp);
-        let limit = match sorted.len() * glued / 1000 {
+        let limit = match sorted.len() * contracted / 1000 {
             0 => f64::NEG_INFINITY,
             count => sorted[count - 1],
         };
@@ -48,7 +48,7 @@ impl<'p> Contracted<'p> {
     }
 
     /// Whether a run is more than a stroke.
-    pub(crate) fn is_glued(&self, run: usize) -> bool {
+    pub(crate) fn is_contracted(&self, run: usize) -> bool {
         self.begin[run + 1] - self.begin[run] > 1
     }
 

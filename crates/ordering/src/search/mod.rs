@@ -15,8 +15,8 @@ use orient::orient;
 pub(crate) use problem::{End, Problem};
 use random::Random;
 
-/// The levels of the search: how many links of a thousand are glued, cheapest first, and how many parts of the work
-/// in a thousand are done on what is left. Nothing glued is not nothing done: strokes that are near then have numbers
+/// The levels of the search: how many links of a thousand are contracted, cheapest first, and how many parts of the work
+/// in a thousand are done on what is left. Nothing contracted is not nothing done: strokes that are near then have numbers
 /// that are near, and what is looked at together is together in memory.
 const LEVELS: [(usize, u64); 6] = [(0, 900), (500, 13), (750, 13), (900, 12), (950, 12), (0, 0)];
 
@@ -89,13 +89,13 @@ impl<'p> Best<'p> {
 fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
     let mut random = Random::new();
     let mut best = Best::new(problem, tour);
-    for (glued, share) in LEVELS {
-        let mut level = Contracted::new(problem, best.tour.clone(), glued);
+    for (contracted, share) in LEVELS {
+        let mut level = Contracted::new(problem, best.tour.clone(), contracted);
         let mut search = Search::new(&level.problem, level.problem.file_order());
         search.descend();
         search.kick(work / 1000 * share, &mut random);
         let mut tour = search.finish();
-        if glued == MIRRORED.0 && !problem.one_way {
+        if contracted == MIRRORED.0 && !problem.one_way {
             tour = mirror(&mut level, tour, work / 1000 * MIRRORED.1, &mut random);
         }
         let mut tour = level.expand(&tour);
@@ -108,11 +108,11 @@ fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
 /// Mirrors one run after another, and keeps what is better when the order of the runs has adapted to it.
 fn mirror(level: &mut Contracted, tour: Vec<End>, work: u64, random: &mut Random) -> Vec<End> {
     let runs = level.problem.stroke_count();
-    let glued: Vec<usize> = (1..runs).filter(|&run| level.is_glued(run)).collect();
+    let contracted: Vec<usize> = (1..runs).filter(|&run| level.is_contracted(run)).collect();
     let mut best = tour;
     let mut done = 0;
-    while done < work && !glued.is_empty() {
-        let run = glued[random.below(glued.len())];
+    while done < work && !contracted.is_empty() {
+        let run = contracted[random.below(contracted.len())];
         let before = level.problem.tour_cost(&best);
         let dearer = level.mirror(run);
         let mut search = Search::new(&level.problem, best.clone());
