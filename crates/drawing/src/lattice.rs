@@ -54,13 +54,13 @@ pub(crate) struct Steps {
 }
 
 /// Points in whichever form they fit.
-pub(crate) enum Fitted {
+pub(crate) enum Encoding {
     Pair(Pair),
     Steps(Steps),
 }
 
 /// The form in which the points lie on the lattice; nothing if they do not, or if a step is too long.
-pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Fitted> {
+pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
     let (mm, per_mm) = (pitch.mm(), PICOMETRES_A_MM / f64::from(pitch.0.get()));
     let cell = |p: Point| [nearest(p.x, per_mm), nearest(p.y, per_mm)];
     let lies_on = |p: Point, [x, y]: [i32; 2]| mm * f64::from(x) == p.x && mm * f64::from(y) == p.y;
@@ -78,7 +78,7 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Fitted> {
         return None;
     }
     if points.len() == 2 {
-        return Some(Fitted::Pair(Pair { pitch, ends: [first, at] }));
+        return Some(Encoding::Pair(Pair { pitch, ends: [first, at] }));
     }
     // A difference that wraps around is not that of the points, but it leads from one to the other all the same.
     let width: u8 = match longest {
@@ -103,7 +103,7 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Fitted> {
         }
         at = next;
     }
-    Some(Fitted::Steps(Steps { code: code.into_boxed_slice() }))
+    Some(Encoding::Steps(Steps { code: code.into_boxed_slice() }))
 }
 
 /// A number with the bits that a step needs: its own, or those of its complement where it is negative.
@@ -145,21 +145,21 @@ impl Steps {
         Point::new(mm * f64::from(x), mm * f64::from(y))
     }
 
-    pub(crate) fn points(&self) -> Walk<'_> {
+    pub(crate) fn points(&self) -> Points<'_> {
         let steps = self.code[STEPS..].chunks_exact(self.bytes_a_step());
-        Walk { mm: self.pitch_mm(), at: Some(self.first()), steps }
+        Points { mm: self.pitch_mm(), at: Some(self.first()), steps }
     }
 }
 
 /// The points of [`Steps`], one after the other.
 #[derive(Clone, Debug)]
-pub(crate) struct Walk<'a> {
+pub(crate) struct Points<'a> {
     mm: f64,
     at: Option<[i32; 2]>,
     steps: std::slice::ChunksExact<'a, u8>,
 }
 
-impl Iterator for Walk<'_> {
+impl Iterator for Points<'_> {
     type Item = Point;
 
     #[inline]
@@ -189,8 +189,8 @@ mod tests {
 
     fn back(points: &[Point], pitch: Pitch) -> Option<Vec<Point>> {
         fit(points, pitch).map(|fitted| match fitted {
-            Fitted::Pair(pair) => pair.points().to_vec(),
-            Fitted::Steps(steps) => {
+            Encoding::Pair(pair) => pair.points().to_vec(),
+            Encoding::Steps(steps) => {
                 assert_eq!(steps.len(), points.len());
                 steps.points().collect()
             }

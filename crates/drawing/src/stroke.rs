@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use kurbo::{Affine, CubicBez, Line, Point, Rect};
 
-use crate::lattice::{self, Fitted, Pair, Steps, Walk};
+use crate::lattice::{self, Encoding, Pair, Points, Steps};
 use crate::{EllipticArc, Pitch, Segment};
 
 /// The number of a pen, as the drawing names it: 1 and up. 0 is "no pen" and never draws.
@@ -28,7 +28,7 @@ enum Curve {
     Cubic(Point, Point),
 }
 
-/// Points, and between them curves.
+/// PathPoints, and between them curves.
 #[derive(Clone, Debug, Default)]
 struct Free {
     /// At least one.
@@ -71,13 +71,13 @@ impl PartialEq for Stroke {
 }
 
 /// The vertices of a stroke, one after the other.
-enum Points<'a> {
+enum PathPoints<'a> {
     Pair(std::array::IntoIter<Point, 2>),
-    Steps(Walk<'a>),
+    Steps(Points<'a>),
     List(std::iter::Copied<std::slice::Iter<'a, Point>>),
 }
 
-impl Iterator for Points<'_> {
+impl Iterator for PathPoints<'_> {
     type Item = Point;
 
     #[inline]
@@ -106,8 +106,8 @@ impl Stroke {
     /// `pitch` and not far from one another.
     pub fn on_lattice(pen: Pen, points: &[Point], source: Span, pitch: Pitch) -> Option<Self> {
         let path = match lattice::fit(points, pitch) {
-            Some(Fitted::Pair(pair)) => Path::Pair(pair),
-            Some(Fitted::Steps(steps)) => Path::Steps(steps),
+            Some(Encoding::Pair(pair)) => Path::Pair(pair),
+            Some(Encoding::Steps(steps)) => Path::Steps(steps),
             None => return Self::polyline(pen, points.to_vec(), source),
         };
         Some(Self { pen, source: packed(source), path })
@@ -216,10 +216,10 @@ impl Stroke {
     /// The vertices one after the other, mm.
     pub fn points(&self) -> impl Iterator<Item = Point> + '_ {
         match &self.path {
-            Path::Pair(pair) => Points::Pair(pair.points().into_iter()),
-            Path::Steps(steps) => Points::Steps(steps.points()),
-            Path::Line(points) => Points::List(points.iter().copied()),
-            Path::Free(free) => Points::List(free.vertices.iter().copied()),
+            Path::Pair(pair) => PathPoints::Pair(pair.points().into_iter()),
+            Path::Steps(steps) => PathPoints::Steps(steps.points()),
+            Path::Line(points) => PathPoints::List(points.iter().copied()),
+            Path::Free(free) => PathPoints::List(free.vertices.iter().copied()),
         }
     }
 
