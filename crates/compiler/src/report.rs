@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use drawing::Drawing;
 use kinematics::Machine;
 use serde_json::{Value, json};
-use verify::{Certificate, Deviation, MotorPeak, Spread};
+use verify::{Certificate, Deviation, DeviationStats, MotorPeak};
 
 use crate::pipeline::{Compiled, Request};
 
@@ -77,17 +77,17 @@ pub fn certificate(certificate: &Certificate) -> Value {
 }
 
 fn deviation(deviation: &Deviation) -> Value {
-    let spread = |spread: &Spread| {
+    let stats = |stats: &DeviationStats| {
         json!({
-            "max_mm": spread.max_mm,
-            "p99_mm": spread.p99_mm,
-            "more": spread.more,
-            "unseen_mm": spread.unseen_mm,
+            "max_mm": stats.max_mm,
+            "p99_mm": stats.p99_mm,
+            "more": stats.more,
+            "unseen_mm": stats.unseen_mm,
         })
     };
     json!({
-        "ink_to_drawing": spread(&deviation.ink_to_drawing),
-        "drawing_to_ink": spread(&deviation.drawing_to_ink),
+        "ink_to_drawing": stats(&deviation.ink_to_drawing),
+        "drawing_to_ink": stats(&deviation.drawing_to_ink),
     })
 }
 
@@ -242,15 +242,15 @@ fn details(certificate: &Certificate) -> String {
 }
 
 fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
-    let spread = |spread: &Spread| {
-        let more = if spread.more { "more than " } else { "" };
-        format!("{more}{:.4} mm (99 %: {:.4})", spread.max_mm, spread.p99_mm)
+    let stats = |stats: &DeviationStats| {
+        let more = if stats.more { "more than " } else { "" };
+        format!("{more}{:.4} mm (99 %: {:.4})", stats.max_mm, stats.p99_mm)
     };
     let _ = writeln!(
         text,
         "  {what}: ink strays by at most {}, drawing missed by at most {}",
-        spread(&deviation.ink_to_drawing),
-        spread(&deviation.drawing_to_ink)
+        stats(&deviation.ink_to_drawing),
+        stats(&deviation.drawing_to_ink)
     );
 }
 

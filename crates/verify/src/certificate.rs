@@ -42,9 +42,9 @@ pub struct Certificate {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
     /// How far the ink strays: from each point of the ink to the nearest stroke of the same pen.
-    pub ink_to_drawing: Spread,
+    pub ink_to_drawing: DeviationStats,
     /// How much is missed: from each point of the drawing to the nearest ink of the same pen.
-    pub drawing_to_ink: Spread,
+    pub drawing_to_ink: DeviationStats,
 }
 
 impl Deviation {
@@ -56,7 +56,7 @@ impl Deviation {
 
 /// How a distance is spread along a length. Both figures are bounds from above.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
+pub struct DeviationStats {
     /// Largest distance, mm. Never understated; overstated by a hundredth of the tolerance at most for the ink, and for
     /// the drawing by an eighth (by two thousandths where the ink's straight parts are no shorter than that).
     pub max_mm: f64,

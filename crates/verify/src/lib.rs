@@ -22,6 +22,6 @@ mod target;
 mod trace;
 mod verifier;
 
-pub use certificate::{Certificate, Deviation, JerkPeak, MotorPeak, Spread, TickFloor};
+pub use certificate::{Certificate, Deviation, DeviationStats, JerkPeak, MotorPeak, TickFloor};
 pub use failure::{Failure, PenMotion, Place, Violation};
 pub use verifier::{ExactRow, Verifier, certify};

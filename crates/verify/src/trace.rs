@@ -23,7 +23,7 @@ use std::ops::Range;
 use drawing::{Point, Rect, Vec2};
 
 use crate::{
-    Place, Spread,
+    DeviationStats, Place,
     histogram::Histogram,
     target::{BLOCK, PenTarget, Piece, Target, meet},
 };
@@ -415,9 +415,14 @@ impl Trace {
     }
 
     /// How far the ink strays.
-    pub(crate) fn ink_to_drawing(&self) -> Spread {
+    pub(crate) fn ink_to_drawing(&self) -> DeviationStats {
         let max_mm = self.worst.map_or(0.0, |worst| worst.mm);
-        Spread { max_mm, p99_mm: self.distances.percentile(0.99, max_mm), more: false, unseen_mm: 0.0 }
+        DeviationStats {
+            max_mm,
+            p99_mm: self.distances.percentile(0.99, max_mm),
+            more: false,
+            unseen_mm: 0.0,
+        }
     }
 
     /// Pen, distance and place of the ink that strays furthest.
@@ -436,7 +441,7 @@ impl Trace {
     }
 
     /// How much of the drawing is missed, and, pen by pen, what is missed by more than `allowed`.
-    pub(crate) fn drawing_to_ink(&self, target: &Target, allowed: f64) -> (Spread, Vec<Miss>) {
+    pub(crate) fn drawing_to_ink(&self, target: &Target, allowed: f64) -> (DeviationStats, Vec<Miss>) {
         let mut distances = Histogram::new();
         let (mut max_mm, mut more) = (0.0_f64, false);
         let mut misses = Vec::new();
@@ -486,7 +491,7 @@ impl Trace {
             misses.extend(miss.map(|miss| Miss { strokes: missed_strokes.len() as u64, ..miss }));
         }
         let p99_mm = distances.percentile(0.99, max_mm);
-        (Spread { max_mm, p99_mm, more, unseen_mm: 0.5 * target.sparse_mm }, misses)
+        (DeviationStats { max_mm, p99_mm, more, unseen_mm: 0.5 * target.sparse_mm }, misses)
     }
 }
 

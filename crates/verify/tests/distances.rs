@@ -100,26 +100,26 @@ fn certify(machine: &Machine, drawing: &Drawing, rows: &[(u16, [f64; 2])]) -> Ce
 /// Never below brute force, and not far above.
 fn compare(found: &Deviation, ink: &Lines, drawing: &Lines, radius: f64) -> Result<(), TestCaseError> {
     let (strays, strays_p99) = directed(ink, drawing);
-    let spread = found.ink_to_drawing;
+    let stats = found.ink_to_drawing;
     let slack = 0.5 * STEP + 0.01 * TOLERANCE;
-    prop_assert!(spread.max_mm >= strays - 1e-4, "strays {strays}, found {spread:?}");
-    prop_assert!(spread.max_mm <= strays + slack, "strays {strays}, found {spread:?}");
-    prop_assert!(spread.p99_mm >= strays_p99 - STEP, "p99 {strays_p99}, found {spread:?}");
-    prop_assert!(spread.p99_mm <= spread.max_mm);
+    prop_assert!(stats.max_mm >= strays - 1e-4, "strays {strays}, found {stats:?}");
+    prop_assert!(stats.max_mm <= strays + slack, "strays {strays}, found {stats:?}");
+    prop_assert!(stats.p99_mm >= strays_p99 - STEP, "p99 {strays_p99}, found {stats:?}");
+    prop_assert!(stats.p99_mm <= stats.max_mm);
 
     let (missed, missed_p99) = directed(drawing, ink);
-    let spread = found.drawing_to_ink;
+    let stats = found.drawing_to_ink;
     // Cells are a quarter of the tolerance. The largest bound is off by half a cell at the most, others by a whole one.
     let slack = 0.5 * STEP + TOLERANCE / 8.0 + 0.01 * TOLERANCE;
-    if spread.more {
-        prop_assert!(missed > radius - slack, "missed {missed}, found {spread:?}");
+    if stats.more {
+        prop_assert!(missed > radius - slack, "missed {missed}, found {stats:?}");
     } else {
-        prop_assert!(spread.max_mm >= missed - 1e-4, "missed {missed}, found {spread:?}");
-        prop_assert!(spread.max_mm <= missed + slack, "missed {missed}, found {spread:?}");
-        prop_assert!(spread.p99_mm >= missed_p99 - STEP, "p99 {missed_p99}, found {spread:?}");
+        prop_assert!(stats.max_mm >= missed - 1e-4, "missed {missed}, found {stats:?}");
+        prop_assert!(stats.max_mm <= missed + slack, "missed {missed}, found {stats:?}");
+        prop_assert!(stats.p99_mm >= missed_p99 - STEP, "p99 {missed_p99}, found {stats:?}");
         prop_assert!(
-            spread.p99_mm <= (missed_p99 + 2.0 * slack) * (1.0 + 1.0 / 64.0),
-            "p99 {missed_p99}, {spread:?}"
+            stats.p99_mm <= (missed_p99 + 2.0 * slack) * (1.0 + 1.0 / 64.0),
+            "p99 {missed_p99}, {stats:?}"
         );
     }
     Ok(())
@@ -274,11 +274,8 @@ fn the_whole_tolerance_may_be_used() {
             let certificate = certify(&machine, &drawing, &rows_through(&machine, &vec![(1, points)]));
             let before = certificate.before_rounding.expect("exact positions");
             let slack = 2e-3 * TOLERANCE;
-            for spread in [before.ink_to_drawing, before.drawing_to_ink] {
-                assert!(
-                    spread.max_mm <= largest + slack,
-                    "turn {turn}, {steps} steps: {largest}, {spread:?}"
-                );
+            for stats in [before.ink_to_drawing, before.drawing_to_ink] {
+                assert!(stats.max_mm <= largest + slack, "turn {turn}, {steps} steps: {largest}, {stats:?}");
             }
             assert!(before.drawing_to_ink.max_mm >= 0.99 * largest, "turn {turn}, {steps} steps: {before:?}");
         }
@@ -315,7 +312,7 @@ fn a_drawing_of_hundreds_of_kilometres_is_sampled() {
     let drawing = Drawing { strokes: strokes.collect() };
     let rows = [(0, [0.0, 0.0]), (0, [0.0, 0.0]), (1, [0.0, 0.0]), (1, [5000.0, 0.0]), (0, [5000.0, 0.0])];
     let certificate = certify(&machine, &drawing, &rows);
-    let spread = certificate.after_rounding.drawing_to_ink;
-    assert!(spread.more && spread.unseen_mm > 5.0, "{spread:?}");
+    let stats = certificate.after_rounding.drawing_to_ink;
+    assert!(stats.more && stats.unseen_mm > 5.0, "{stats:?}");
     assert!(certificate.after_rounding.ink_to_drawing.max_mm < 1e-9);
 }
