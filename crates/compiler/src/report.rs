@@ -81,7 +81,7 @@ fn deviation(deviation: &Deviation) -> Value {
         json!({
             "max_mm": stats.max_mm,
             "p99_mm": stats.p99_mm,
-            "more": stats.more,
+            "more": stats.is_lower_bound,
             "unseen_mm": stats.unseen_mm,
         })
     };
@@ -243,7 +243,7 @@ fn details(certificate: &Certificate) -> String {
 
 fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
     let stats = |stats: &DeviationStats| {
-        let more = if stats.more { "more than " } else { "" };
+        let more = if stats.is_lower_bound { "more than " } else { "" };
         format!("{more}{:.4} mm (99 %: {:.4})", stats.max_mm, stats.p99_mm)
     };
     let _ = writeln!(

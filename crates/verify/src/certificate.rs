@@ -64,7 +64,7 @@ pub struct DeviationStats {
     /// for the maximum alone.
     pub p99_mm: f64,
     /// Whether the largest distance is only known to be more than `max_mm`: strokes that no ink came near.
-    pub more: bool,
+    pub is_lower_bound: bool,
     /// By how much more than `max_mm` the distance could be between the points that were looked at, mm. 0 except for
     /// drawings of such a length that they can only be sampled sparsely.
     pub unseen_mm: f64,

@@ -174,7 +174,7 @@ pub enum Violation {
         "{missed_mm:.2} mm of pen {pen} in {strokes} stroke{} are missed, by {} {distance_mm:.4} mm {} \
          where {allowed_mm:.4} mm are allowed",
         if *.strokes == 1 { "" } else { "s" },
-        if *.more { "more than" } else { "up to" },
+        if *.is_lower_bound { "more than" } else { "up to" },
         stage(*.rounded)
     )]
     Missed {
@@ -185,7 +185,7 @@ pub enum Violation {
         /// How far the worst place is from ink.
         distance_mm: f64,
         /// Whether it is only known to be more than that.
-        more: bool,
+        is_lower_bound: bool,
         /// How far it may be.
         allowed_mm: f64,
         /// How much of the drawing is too far; 0 for a dot.

@@ -94,7 +94,7 @@ pub(crate) struct Miss {
     pub(crate) pen: u16,
     pub(crate) mm: f64,
     /// Whether `mm` is only known to be exceeded.
-    pub(crate) more: bool,
+    pub(crate) is_lower_bound: bool,
     /// Length of what is missed.
     pub(crate) length: f64,
     /// How many strokes miss a part.
@@ -420,7 +420,7 @@ impl Trace {
         DeviationStats {
             max_mm,
             p99_mm: self.distances.percentile(0.99, max_mm),
-            more: false,
+            is_lower_bound: false,
             unseen_mm: 0.0,
         }
     }
@@ -443,7 +443,7 @@ impl Trace {
     /// How much of the drawing is missed, and, pen by pen, what is missed by more than `allowed`.
     pub(crate) fn drawing_to_ink(&self, target: &Target, allowed: f64) -> (DeviationStats, Vec<Miss>) {
         let mut distances = Histogram::new();
-        let (mut max_mm, mut more) = (0.0_f64, false);
+        let (mut max_mm, mut is_lower_bound) = (0.0_f64, false);
         let mut misses = Vec::new();
         for strokes in &target.pens {
             let mut miss: Option<Miss> = None;
@@ -458,7 +458,7 @@ impl Trace {
                     let mm = if unknown { self.smallest_radius } else { f64::from(*covered) };
                     distances.add(mm, cell);
                     max_mm = max_mm.max(mm);
-                    more |= unknown;
+                    is_lower_bound |= unknown;
                     if mm <= allowed {
                         continue;
                     }
@@ -467,13 +467,13 @@ impl Trace {
                     let miss = miss.get_or_insert(Miss {
                         pen: strokes.pen,
                         mm: 0.0,
-                        more: false,
+                        is_lower_bound: false,
                         length: 0.0,
                         strokes: 0,
                         place: Place::default(),
                     });
                     miss.length += cell;
-                    miss.more |= unknown;
+                    miss.is_lower_bound |= unknown;
                     if mm > miss.mm {
                         miss.mm = mm;
                         miss.place = Place {
@@ -491,7 +491,7 @@ impl Trace {
             misses.extend(miss.map(|miss| Miss { strokes: missed_strokes.len() as u64, ..miss }));
         }
         let p99_mm = distances.percentile(0.99, max_mm);
-        (DeviationStats { max_mm, p99_mm, more, unseen_mm: 0.5 * target.sparse_mm }, misses)
+        (DeviationStats { max_mm, p99_mm, is_lower_bound, unseen_mm: 0.5 * target.sparse_mm }, misses)
     }
 }
 

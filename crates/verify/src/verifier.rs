@@ -486,7 +486,7 @@ fn deviation(
             pen: miss.pen,
             rounded,
             distance_mm: miss.mm,
-            more: miss.more,
+            is_lower_bound: miss.is_lower_bound,
             allowed_mm,
             missed_mm: miss.length,
             strokes: miss.strokes,

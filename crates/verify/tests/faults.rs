@@ -102,12 +102,14 @@ fn a_missed_segment() {
     plotter.stroke(1, &SQUARE[..4]).stroke(2, SLANT).stroke(1, DOT).park();
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
-    let Violation::Missed { pen: 1, rounded: true, more: true, missed_mm, strokes: 1, .. } = violation else {
+    let Violation::Missed { pen: 1, rounded: true, is_lower_bound: true, missed_mm, strokes: 1, .. } =
+        violation
+    else {
         panic!("{sentence}")
     };
     assert!((missed_mm - 30.0).abs() < 0.5, "{sentence}");
     assert_eq!(certificate.failures[0].place.stroke, Some(0));
-    assert!(certificate.after_rounding.drawing_to_ink.more);
+    assert!(certificate.after_rounding.drawing_to_ink.is_lower_bound);
 }
 
 #[test]
@@ -117,7 +119,10 @@ fn a_missed_dot() {
     plotter.stroke(1, SQUARE).stroke(2, SLANT).park();
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
-    assert!(matches!(violation, Violation::Missed { pen: 1, more: true, missed_mm: 0.0, .. }), "{sentence}");
+    assert!(
+        matches!(violation, Violation::Missed { pen: 1, is_lower_bound: true, missed_mm: 0.0, .. }),
+        "{sentence}"
+    );
     let place = certificate.failures[0].place;
     assert_eq!((place.stroke, place.source.map(|span| span.start)), (Some(2), Some(2)));
 }
