@@ -82,7 +82,7 @@ fn deviation(deviation: &Deviation) -> Value {
             "max_mm": stats.max_mm,
             "p99_mm": stats.p99_mm,
             "more": stats.is_lower_bound,
-            "unseen_mm": stats.unseen_mm,
+            "unseen_mm": stats.sampling_error_mm,
         })
     };
     json!({

@@ -67,7 +67,7 @@ pub struct DeviationStats {
     pub is_lower_bound: bool,
     /// By how much more than `max_mm` the distance could be between the points that were looked at, mm. 0 except for
     /// drawings of such a length that they can only be sampled sparsely.
-    pub unseen_mm: f64,
+    pub sampling_error_mm: f64,
 }
 
 /// The pen's error that comes from motors standing on whole ticks alone.

@@ -421,7 +421,7 @@ impl Trace {
             max_mm,
             p99_mm: self.distances.percentile(0.99, max_mm),
             is_lower_bound: false,
-            unseen_mm: 0.0,
+            sampling_error_mm: 0.0,
         }
     }
 
@@ -491,7 +491,7 @@ impl Trace {
             misses.extend(miss.map(|miss| Miss { strokes: missed_strokes.len() as u64, ..miss }));
         }
         let p99_mm = distances.percentile(0.99, max_mm);
-        (DeviationStats { max_mm, p99_mm, is_lower_bound, unseen_mm: 0.5 * target.sparse_mm }, misses)
+        (DeviationStats { max_mm, p99_mm, is_lower_bound, sampling_error_mm: 0.5 * target.sparse_mm }, misses)
     }
 }
 

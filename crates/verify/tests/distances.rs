@@ -313,6 +313,6 @@ fn a_drawing_of_hundreds_of_kilometres_is_sampled() {
     let rows = [(0, [0.0, 0.0]), (0, [0.0, 0.0]), (1, [0.0, 0.0]), (1, [5000.0, 0.0]), (0, [5000.0, 0.0])];
     let certificate = certify(&machine, &drawing, &rows);
     let stats = certificate.after_rounding.drawing_to_ink;
-    assert!(stats.is_lower_bound && stats.unseen_mm > 5.0, "{stats:?}");
+    assert!(stats.is_lower_bound && stats.sampling_error_mm > 5.0, "{stats:?}");
     assert!(certificate.after_rounding.ink_to_drawing.max_mm < 1e-9);
 }
