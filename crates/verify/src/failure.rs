@@ -159,7 +159,7 @@ pub enum Violation {
         "ink of pen {pen} strays {distance_mm:.4} mm from the drawing {} where {allowed_mm:.4} mm are allowed",
         stage(*.rounded)
     )]
-    Strays {
+    Deviates {
         /// The pen.
         pen: u16,
         /// Whether it is the path of the whole ticks, rather than the one before rounding.
@@ -171,13 +171,13 @@ pub enum Violation {
     },
     /// A part of the drawing too far from any ink.
     #[error(
-        "{missed_mm:.2} mm of pen {pen} in {strokes} stroke{} are missed, by {} {distance_mm:.4} mm {} \
+        "{uncovered_mm:.2} mm of pen {pen} in {strokes} stroke{} are missed, by {} {distance_mm:.4} mm {} \
          where {allowed_mm:.4} mm are allowed",
         if *.strokes == 1 { "" } else { "s" },
         if *.is_lower_bound { "more than" } else { "up to" },
         stage(*.rounded)
     )]
-    Missed {
+    Uncovered {
         /// The pen.
         pen: u16,
         /// Whether it is the path of the whole ticks, rather than the one before rounding.
@@ -189,7 +189,7 @@ pub enum Violation {
         /// How far it may be.
         allowed_mm: f64,
         /// How much of the drawing is too far; 0 for a dot.
-        missed_mm: f64,
+        uncovered_mm: f64,
         /// In how many strokes.
         strokes: u64,
     },

@@ -90,14 +90,14 @@ struct Worst {
 
 /// A part of the drawing that no ink comes near enough to.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Miss {
+pub(crate) struct UncoveredPart {
     pub(crate) pen: u16,
     pub(crate) mm: f64,
     /// Whether `mm` is only known to be exceeded.
     pub(crate) is_lower_bound: bool,
     /// Length of what is missed.
     pub(crate) length: f64,
-    /// How many strokes miss a part.
+    /// How many strokes part a part.
     pub(crate) strokes: u64,
     pub(crate) place: Place,
 }
@@ -426,7 +426,7 @@ impl Trace {
     }
 
     /// Pen, distance and place of the ink that strays furthest.
-    pub(crate) fn stray(&self, target: &Target) -> Option<(u16, f64, Place)> {
+    pub(crate) fn worst_ink(&self, target: &Target) -> Option<(u16, f64, Place)> {
         self.worst.map(|worst| {
             let stroke = worst.stroke as usize;
             let place = Place {
@@ -441,13 +441,17 @@ impl Trace {
     }
 
     /// How much of the drawing is missed, and, pen by pen, what is missed by more than `allowed`.
-    pub(crate) fn drawing_to_ink(&self, target: &Target, allowed: f64) -> (DeviationStats, Vec<Miss>) {
+    pub(crate) fn drawing_to_ink(
+        &self,
+        target: &Target,
+        allowed: f64,
+    ) -> (DeviationStats, Vec<UncoveredPart>) {
         let mut distances = Histogram::new();
         let (mut max_mm, mut is_lower_bound) = (0.0_f64, false);
-        let mut misses = Vec::new();
+        let mut uncovered = Vec::new();
         for strokes in &target.pens {
-            let mut miss: Option<Miss> = None;
-            let mut missed_strokes = Vec::new();
+            let mut part: Option<UncoveredPart> = None;
+            let mut uncovered_strokes = Vec::new();
             for piece in &strokes.pieces {
                 let cell = piece.length / f64::from(piece.cells);
                 let first = piece.first_cell as usize;
@@ -463,8 +467,8 @@ impl Trace {
                         continue;
                     }
                     let stroke = piece.stroke as usize;
-                    missed_strokes.push(stroke);
-                    let miss = miss.get_or_insert(Miss {
+                    uncovered_strokes.push(stroke);
+                    let part = part.get_or_insert(UncoveredPart {
                         pen: strokes.pen,
                         mm: 0.0,
                         is_lower_bound: false,
@@ -472,11 +476,11 @@ impl Trace {
                         strokes: 0,
                         place: Place::default(),
                     });
-                    miss.length += cell;
-                    miss.is_lower_bound |= unknown;
-                    if mm > miss.mm {
-                        miss.mm = mm;
-                        miss.place = Place {
+                    part.length += cell;
+                    part.is_lower_bound |= unknown;
+                    if mm > part.mm {
+                        part.mm = mm;
+                        part.place = Place {
                             point_mm: Some(piece.at((index as f64 + 0.5) * cell)),
                             stroke: Some(stroke),
                             source: target.sources.get(stroke).copied(),
@@ -484,14 +488,18 @@ impl Trace {
                         };
                     }
                 }
-                missed_strokes.dedup();
+                uncovered_strokes.dedup();
             }
-            missed_strokes.sort_unstable();
-            missed_strokes.dedup();
-            misses.extend(miss.map(|miss| Miss { strokes: missed_strokes.len() as u64, ..miss }));
+            uncovered_strokes.sort_unstable();
+            uncovered_strokes.dedup();
+            uncovered
+                .extend(part.map(|part| UncoveredPart { strokes: uncovered_strokes.len() as u64, ..part }));
         }
         let p99_mm = distances.percentile(0.99, max_mm);
-        (DeviationStats { max_mm, p99_mm, is_lower_bound, sampling_error_mm: 0.5 * target.sparse_mm }, misses)
+        (
+            DeviationStats { max_mm, p99_mm, is_lower_bound, sampling_error_mm: 0.5 * target.sparse_mm },
+            uncovered,
+        )
     }
 }
 

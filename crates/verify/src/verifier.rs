@@ -472,26 +472,26 @@ fn deviation(
     rounded: bool,
 ) -> Deviation {
     let limit = forgive(allowed_mm);
-    if let Some((pen, distance_mm, place)) = trace.stray(target) {
+    if let Some((pen, distance_mm, place)) = trace.worst_ink(target) {
         // Not a number is not within the limit either.
         let within = distance_mm <= limit;
         if !within {
-            let violation = Violation::Strays { pen, rounded, distance_mm, allowed_mm };
+            let violation = Violation::Deviates { pen, rounded, distance_mm, allowed_mm };
             failures.note(violation, usize::from(rounded), 0.0, place);
         }
     }
-    let (drawing_to_ink, misses) = trace.drawing_to_ink(target, limit);
-    for miss in misses {
-        let violation = Violation::Missed {
-            pen: miss.pen,
+    let (drawing_to_ink, uncovered) = trace.drawing_to_ink(target, limit);
+    for part in uncovered {
+        let violation = Violation::Uncovered {
+            pen: part.pen,
             rounded,
-            distance_mm: miss.mm,
-            is_lower_bound: miss.is_lower_bound,
+            distance_mm: part.mm,
+            is_lower_bound: part.is_lower_bound,
             allowed_mm,
-            missed_mm: miss.length,
-            strokes: miss.strokes,
+            uncovered_mm: part.length,
+            strokes: part.strokes,
         };
-        failures.note(violation, 2 * usize::from(miss.pen) + usize::from(rounded), 0.0, miss.place);
+        failures.note(violation, 2 * usize::from(part.pen) + usize::from(rounded), 0.0, part.place);
     }
     Deviation { ink_to_drawing: trace.ink_to_drawing(), drawing_to_ink }
 }

@@ -102,12 +102,13 @@ fn a_missed_segment() {
     plotter.stroke(1, &SQUARE[..4]).stroke(2, SLANT).stroke(1, DOT).park();
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
-    let Violation::Missed { pen: 1, rounded: true, is_lower_bound: true, missed_mm, strokes: 1, .. } =
-        violation
+    let Violation::Uncovered {
+        pen: 1, rounded: true, is_lower_bound: true, uncovered_mm, strokes: 1, ..
+    } = violation
     else {
         panic!("{sentence}")
     };
-    assert!((missed_mm - 30.0).abs() < 0.5, "{sentence}");
+    assert!((uncovered_mm - 30.0).abs() < 0.5, "{sentence}");
     assert_eq!(certificate.failures[0].place.stroke, Some(0));
     assert!(certificate.after_rounding.drawing_to_ink.is_lower_bound);
 }
@@ -120,7 +121,7 @@ fn a_missed_dot() {
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
     assert!(
-        matches!(violation, Violation::Missed { pen: 1, is_lower_bound: true, missed_mm: 0.0, .. }),
+        matches!(violation, Violation::Uncovered { pen: 1, is_lower_bound: true, uncovered_mm: 0.0, .. }),
         "{sentence}"
     );
     let place = certificate.failures[0].place;
@@ -134,7 +135,7 @@ fn a_dot_too_many() {
     plotter.stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT).stroke(2, &[(50.0, 40.0)]).park();
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
-    assert!(matches!(violation, Violation::Strays { pen: 2, .. }), "{sentence}");
+    assert!(matches!(violation, Violation::Deviates { pen: 2, .. }), "{sentence}");
 }
 
 #[test]
@@ -154,7 +155,7 @@ fn a_stray_of_three_tenths() {
         .park();
     let certificate = plotter.verify(&picture(), TOLERANCE);
     assert!(
-        certificate.failures.iter().all(|f| matches!(f.violation, Violation::Strays { pen: 1, .. })),
+        certificate.failures.iter().all(|f| matches!(f.violation, Violation::Deviates { pen: 1, .. })),
         "{:#?}",
         sentences(&certificate)
     );
@@ -174,7 +175,7 @@ fn a_stray_far_away_is_measured() {
     plotter.stroke(1, &[(150.0, 35.0), (160.0, 35.0)]).park();
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
-    let Violation::Strays { distance_mm, .. } = violation else { panic!("{sentence}") };
+    let Violation::Deviates { distance_mm, .. } = violation else { panic!("{sentence}") };
     assert!((distance_mm - 100.0).abs() < 0.01, "{sentence}");
 }
 
@@ -290,7 +291,7 @@ fn the_wrong_pen() {
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let violations: Vec<_> = certificate.failures.iter().map(|failure| &failure.violation).collect();
     assert!(
-        matches!(violations[..], [Violation::ForeignPen { pen: 3 }, Violation::Missed { pen: 2, .. }]),
+        matches!(violations[..], [Violation::ForeignPen { pen: 3 }, Violation::Uncovered { pen: 2, .. }]),
         "{violations:#?}"
     );
     assert_eq!(certificate.pens, [1, 3]);
