@@ -26,7 +26,7 @@ impl fmt::Display for PenMotion {
     }
 }
 
-/// One way in which a plan breaks its promise. Its `Display` is half a sentence, without the place.
+/// One way in which a plan breaks its promise. Its `Display` is half a sentence, without the location.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Violation {
     /// The table has no rows at all.
@@ -226,7 +226,7 @@ impl Violation {
 
 /// Where something is wrong, as far as that is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Place {
+pub struct Location {
     /// Row of the table, from 0.
     pub row: Option<u64>,
     /// Time of that row, microseconds.
@@ -245,7 +245,7 @@ pub struct Failure {
     /// What.
     pub violation: Violation,
     /// Where.
-    pub place: Place,
+    pub location: Location,
     /// In how many rows, or pieces of path, of this plan; at least 1.
     pub count: u64,
 }
@@ -253,20 +253,20 @@ pub struct Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.violation)?;
-        let place = &self.place;
-        if let Some(t_us) = place.t_us {
+        let location = &self.location;
+        if let Some(t_us) = location.t_us {
             write!(f, ", at {}.{:06} s", t_us / 1_000_000, t_us % 1_000_000)?;
         }
-        if let Some(row) = place.row {
+        if let Some(row) = location.row {
             write!(f, ", row {row}")?;
         }
-        if let Some(point) = place.point_mm {
+        if let Some(point) = location.point_mm {
             write!(f, ", at {:.2}, {:.2} mm", point.x, point.y)?;
         }
-        if let Some(stroke) = place.stroke {
+        if let Some(stroke) = location.stroke {
             write!(f, ", stroke {stroke}")?;
         }
-        if let Some(source) = place.source {
+        if let Some(source) = location.source {
             write!(f, " (bytes {} to {})", source.start, source.end)?;
         }
         if self.count > 1 {
@@ -276,7 +276,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Failures as they come in: each kind kept once, with its worst or first place.
+/// Failures as they come in: each kind kept once, with its worst or first location.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Failures {
     kept: Vec<(Failure, usize, f64)>,
@@ -285,18 +285,18 @@ pub(crate) struct Failures {
 impl Failures {
     /// Notes a failure. `which` tells motors apart; of several alike the one of the largest `severity` stays, the
     /// first of equals.
-    pub(crate) fn note(&mut self, violation: Violation, which: usize, severity: f64, place: Place) {
+    pub(crate) fn note(&mut self, violation: Violation, which: usize, severity: f64, location: Location) {
         let kind = std::mem::discriminant(&violation);
         let known = self
             .kept
             .iter_mut()
             .find(|(failure, of, _)| *of == which && std::mem::discriminant(&failure.violation) == kind);
         match known {
-            None => self.kept.push((Failure { violation, place, count: 1 }, which, severity)),
+            None => self.kept.push((Failure { violation, location, count: 1 }, which, severity)),
             Some((failure, _, worst)) => {
                 failure.count += 1;
                 if severity > *worst {
-                    (failure.violation, failure.place, *worst) = (violation, place, severity);
+                    (failure.violation, failure.location, *worst) = (violation, location, severity);
                 }
             }
         }

@@ -23,5 +23,5 @@ mod trace;
 mod verifier;
 
 pub use certificate::{Certificate, Deviation, DeviationStats, JerkPeak, MotorPeak, TickFloor};
-pub use failure::{Failure, PenMotion, Place, Violation};
+pub use failure::{Failure, Location, PenMotion, Violation};
 pub use verifier::{ExactRow, Verifier, certify};

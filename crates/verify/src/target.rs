@@ -112,7 +112,7 @@ pub(crate) struct PenTarget {
     pub(crate) pen: u16,
     /// In the order of the strokes, and within a stroke along it.
     pub(crate) pieces: Vec<Piece>,
-    /// Their indices by place, see [`by_place`].
+    /// Their indices by location, see [`by_position`].
     order: Vec<u32>,
     /// `levels[0][i]` bounds the pieces that `order` names from `FAN * i` on, `levels[k + 1][i]` the boxes of
     /// `levels[k]` likewise; the last level is one box.
@@ -121,7 +121,7 @@ pub(crate) struct PenTarget {
 
 impl PenTarget {
     fn new(pen: u16, pieces: Vec<Piece>) -> Self {
-        let order = by_place(&pieces);
+        let order = by_position(&pieces);
         let mut levels: Vec<Vec<Rect>> = Vec::new();
         let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
         let bounds = |chunk: &[u32]| chunk.iter().map(|i| pieces[*i as usize].bounds()).collect::<Vec<_>>();
@@ -189,7 +189,7 @@ impl PenTarget {
 }
 
 /// The pieces' indices along a Morton (Z-order) curve through their middles, so that neighbours share boxes.
-fn by_place(pieces: &[Piece]) -> Vec<u32> {
+fn by_position(pieces: &[Piece]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
     let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return order };
     let scale = 65535.0 / all.width().max(all.height()).max(f64::MIN_POSITIVE);

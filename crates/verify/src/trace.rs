@@ -23,7 +23,7 @@ use std::ops::Range;
 use drawing::{Point, Rect, Vec2};
 
 use crate::{
-    DeviationStats, Place,
+    DeviationStats, Location,
     histogram::Histogram,
     target::{BLOCK, PenTarget, Piece, Target, meet},
 };
@@ -99,7 +99,7 @@ pub(crate) struct UncoveredPart {
     pub(crate) length: f64,
     /// How many strokes part a part.
     pub(crate) strokes: u64,
-    pub(crate) place: Place,
+    pub(crate) location: Location,
 }
 
 /// One path of the pen.
@@ -426,17 +426,17 @@ impl Trace {
     }
 
     /// Pen, distance and place of the ink that strays furthest.
-    pub(crate) fn worst_ink(&self, target: &Target) -> Option<(u16, f64, Place)> {
+    pub(crate) fn worst_ink(&self, target: &Target) -> Option<(u16, f64, Location)> {
         self.worst.map(|worst| {
             let stroke = worst.stroke as usize;
-            let place = Place {
+            let location = Location {
                 row: Some(worst.at.row),
                 t_us: Some(worst.at.t_us),
                 point_mm: Some(worst.point),
                 stroke: Some(stroke),
                 source: target.sources.get(stroke).copied(),
             };
-            (worst.pen, worst.mm, place)
+            (worst.pen, worst.mm, location)
         })
     }
 
@@ -474,17 +474,17 @@ impl Trace {
                         is_lower_bound: false,
                         length: 0.0,
                         strokes: 0,
-                        place: Place::default(),
+                        location: Location::default(),
                     });
                     part.length += cell;
                     part.is_lower_bound |= unknown;
                     if mm > part.mm {
                         part.mm = mm;
-                        part.place = Place {
+                        part.location = Location {
                             point_mm: Some(piece.at((index as f64 + 0.5) * cell)),
                             stroke: Some(stroke),
                             source: target.sources.get(stroke).copied(),
-                            ..Place::default()
+                            ..Location::default()
                         };
                     }
                 }

@@ -5,7 +5,7 @@ use kinematics::{Joints, Machine};
 use plan::{Header, MOTORS, Row};
 
 use crate::{
-    Certificate, Deviation, PenMotion, Place, TickFloor, Violation,
+    Certificate, Deviation, Location, PenMotion, TickFloor, Violation,
     failure::Failures,
     limits::{Excess, MotorCheck},
     target::Target,
@@ -115,8 +115,8 @@ impl<'a> Verifier<'a> {
         let mut failures = Failures::default();
         for &stroke in &target.broken {
             let source = target.sources.get(stroke).copied();
-            let place = Place { stroke: Some(stroke), source, ..Place::default() };
-            failures.note(Violation::NotFinite, 0, 0.0, place);
+            let location = Location { stroke: Some(stroke), source, ..Location::default() };
+            failures.note(Violation::NotFinite, 0, 0.0, location);
         }
         let half_tick = [Joints::new(0.5, 0.0), Joints::new(0.0, 0.5)].map(|tick| machine.joint_rates(&tick));
         Self {
@@ -152,7 +152,7 @@ impl<'a> Verifier<'a> {
     pub fn row(&mut self, row: Row, exact: Option<[f64; MOTORS]>) {
         let index = self.rows;
         self.rows += 1;
-        let here = Place { row: Some(index), t_us: Some(row.t_us), ..Place::default() };
+        let here = Location { row: Some(index), t_us: Some(row.t_us), ..Location::default() };
         match &self.previous {
             None if row.t_us != 0 => {
                 self.failures.note(Violation::TimeStart { t_us: row.t_us }, 0, 0.0, here);
@@ -196,7 +196,7 @@ impl<'a> Verifier<'a> {
         Pose { joints, point: self.machine.geometry().forward(&joints) }
     }
 
-    fn check_joints(&mut self, pose: &Pose, here: Place) {
+    fn check_joints(&mut self, pose: &Pose, here: Location) {
         let joints = &self.machine.parts().joints;
         let mut forgiven = pose.joints;
         for index in 0..MOTORS {
@@ -205,12 +205,12 @@ impl<'a> Verifier<'a> {
             forgiven[index] = value + (inside - value).clamp(-slack, slack);
         }
         if let Some(fault) = self.machine.joint_fault_between(&forgiven) {
-            let place = Place { point_mm: Some(pose.point), ..here };
-            self.failures.note(Violation::Joint { fault }, 0, 0.0, place);
+            let location = Location { point_mm: Some(pose.point), ..here };
+            self.failures.note(Violation::Joint { fault }, 0, 0.0, location);
         }
     }
 
-    fn check_rounding(&mut self, row: Row, exact: Option<[f64; MOTORS]>, here: Place) {
+    fn check_rounding(&mut self, row: Row, exact: Option<[f64; MOTORS]>, here: Location) {
         let Some(exact) = exact else { return };
         for (index, motor) in self.motors.iter().enumerate() {
             let by = (row.ticks[index] as f64 - exact[index]).abs();
@@ -221,13 +221,13 @@ impl<'a> Verifier<'a> {
         }
     }
 
-    fn first(&mut self, current: &Previous, here: Place) {
+    fn first(&mut self, current: &Previous, here: Location) {
         let start = self.machine.ticks(&self.machine.start());
         let expected = [start.x.round() as i64, start.y.round() as i64];
         let Row { pen, ticks: found, .. } = current.row;
         if found != expected {
-            let place = Place { point_mm: Some(current.ticks.point), ..here };
-            self.failures.note(Violation::StartPose { found, expected }, 0, 0.0, place);
+            let location = Location { point_mm: Some(current.ticks.point), ..here };
+            self.failures.note(Violation::StartPose { found, expected }, 0, 0.0, location);
         }
         if pen != 0 {
             self.failures.note(Violation::PenAtStart { pen }, 0, 0.0, here);
@@ -241,11 +241,11 @@ impl<'a> Verifier<'a> {
     fn step(&mut self, previous: &Previous, current: &Previous) {
         let (before, row) = (previous.row, current.row);
         let dt_us = row.t_us - before.t_us;
-        let here = Place {
+        let here = Location {
             row: Some(previous.index),
             t_us: Some(before.t_us),
             point_mm: Some(previous.ticks.point),
-            ..Place::default()
+            ..Location::default()
         };
         let mut moves = false;
         for motor in 0..MOTORS {
@@ -352,13 +352,13 @@ impl<'a> Verifier<'a> {
         self.after.widen(self.floor.worst_mm);
         let at = At { row: current.index, t_us };
         let Some(target) = self.target.pen(pen) else {
-            let place = Place {
+            let location = Location {
                 row: Some(at.row),
                 t_us: Some(t_us),
                 point_mm: Some(current.ticks.point),
-                ..Place::default()
+                ..Location::default()
             };
-            self.failures.note(Violation::ForeignPen { pen }, usize::from(pen), 0.0, place);
+            self.failures.note(Violation::ForeignPen { pen }, usize::from(pen), 0.0, location);
             return;
         };
         self.after.down(target, current.ticks.point, at);
@@ -378,7 +378,7 @@ impl<'a> Verifier<'a> {
     pub fn finish(mut self) -> Certificate {
         self.lift();
         match self.previous {
-            None => self.failures.note(Violation::Empty, 0, 0.0, Place::default()),
+            None => self.failures.note(Violation::Empty, 0, 0.0, Location::default()),
             Some(last) => self.last(&last),
         }
         let tick_floor = self.floor.result();
@@ -415,11 +415,11 @@ impl<'a> Verifier<'a> {
     }
 
     fn last(&mut self, last: &Previous) {
-        let here = Place {
+        let here = Location {
             row: Some(last.index),
             t_us: Some(last.row.t_us),
             point_mm: Some(last.ticks.point),
-            ..Place::default()
+            ..Location::default()
         };
         for motor in 0..MOTORS {
             if let Some(excess) = self.motors[motor].stop() {
@@ -472,12 +472,12 @@ fn deviation(
     rounded: bool,
 ) -> Deviation {
     let limit = forgive(allowed_mm);
-    if let Some((pen, distance_mm, place)) = trace.worst_ink(target) {
+    if let Some((pen, distance_mm, location)) = trace.worst_ink(target) {
         // Not a number is not within the limit either.
         let within = distance_mm <= limit;
         if !within {
             let violation = Violation::Deviates { pen, rounded, distance_mm, allowed_mm };
-            failures.note(violation, usize::from(rounded), 0.0, place);
+            failures.note(violation, usize::from(rounded), 0.0, location);
         }
     }
     let (drawing_to_ink, uncovered) = trace.drawing_to_ink(target, limit);
@@ -491,7 +491,7 @@ fn deviation(
             uncovered_mm: part.length,
             strokes: part.strokes,
         };
-        failures.note(violation, 2 * usize::from(part.pen) + usize::from(rounded), 0.0, part.place);
+        failures.note(violation, 2 * usize::from(part.pen) + usize::from(rounded), 0.0, part.location);
     }
     Deviation { ink_to_drawing: trace.ink_to_drawing(), drawing_to_ink }
 }

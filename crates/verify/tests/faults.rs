@@ -109,7 +109,7 @@ fn a_missed_segment() {
         panic!("{sentence}")
     };
     assert!((uncovered_mm - 30.0).abs() < 0.5, "{sentence}");
-    assert_eq!(certificate.failures[0].place.stroke, Some(0));
+    assert_eq!(certificate.failures[0].location.stroke, Some(0));
     assert!(certificate.after_rounding.drawing_to_ink.is_lower_bound);
 }
 
@@ -124,8 +124,8 @@ fn a_missed_dot() {
         matches!(violation, Violation::Uncovered { pen: 1, is_lower_bound: true, uncovered_mm: 0.0, .. }),
         "{sentence}"
     );
-    let place = certificate.failures[0].place;
-    assert_eq!((place.stroke, place.source.map(|span| span.start)), (Some(2), Some(2)));
+    let location = certificate.failures[0].location;
+    assert_eq!((location.stroke, location.source.map(|span| span.start)), (Some(2), Some(2)));
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn a_stray_of_three_tenths() {
     assert!((before.ink_to_drawing.max_mm - 0.3).abs() < 0.001, "{before:?}");
     assert!(before.drawing_to_ink.max_mm < 0.001, "{before:?}");
     assert!(before.ink_to_drawing.p99_mm < 0.01, "{before:?}");
-    let point = certificate.failures[0].place.point_mm.expect("a point");
+    let point = certificate.failures[0].location.point_mm.expect("a point");
     assert!((point.x - 30.0).abs() < 1e-6 && (point.y - 20.3).abs() < 1e-6, "{point:?}");
 }
 
@@ -217,7 +217,7 @@ fn too_hard_an_acceleration() {
     let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
     let (violation, sentence) = only(&certificate);
     assert!(matches!(violation, Violation::Acceleration { motor, .. } if motor == "x"), "{sentence}");
-    assert_eq!(certificate.failures[0].place.row, Some(row as u64));
+    assert_eq!(certificate.failures[0].location.row, Some(row as u64));
 }
 
 #[test]
@@ -232,7 +232,7 @@ fn time_stands_still_or_goes_back() {
         let certificate = plotter.verify_as(&picture(), TOLERANCE, false);
         let (violation, sentence) = only(&certificate);
         assert!(matches!(violation, Violation::Time { .. }), "{sentence}");
-        assert_eq!(certificate.failures[0].place.row, Some(row as u64 + 1));
+        assert_eq!(certificate.failures[0].location.row, Some(row as u64 + 1));
     }
 }
 
