@@ -64,7 +64,7 @@ pub fn certificate(certificate: &Certificate) -> Value {
             "worst_mm": certificate.tick_floor.worst_mm,
             "rms_mm": certificate.tick_floor.rms_mm,
         },
-        "largest_rounding_ticks": certificate.largest_rounding,
+        "largest_rounding_ticks": certificate.largest_rounding_ticks,
         "pens": certificate.pens,
         "motors": certificate.motors.iter().map(motor).collect::<Vec<_>>(),
         "rows": certificate.rows,
@@ -94,17 +94,17 @@ fn deviation(deviation: &Deviation) -> Value {
 fn motor(peak: &MotorPeak) -> Value {
     json!({
         "name": peak.name,
-        "speed": peak.speed,
-        "speed_limit": peak.speed_limit,
+        "speed": peak.speed_ticks_s,
+        "speed_limit": peak.speed_limit_ticks_s,
         "speed_share": peak.speed_share,
         "speed_share_p999": peak.speed_share_p999,
-        "acceleration": peak.acceleration,
-        "acceleration_limit": peak.acceleration_limit,
+        "acceleration": peak.acceleration_ticks_s2,
+        "acceleration_limit": peak.acceleration_limit_ticks_s2,
         "acceleration_share": peak.acceleration_share,
         "acceleration_share_p999": peak.acceleration_share_p999,
         "jerk": peak.jerk.map(|peak| json!({
-            "jerk": peak.jerk,
-            "limit": peak.limit,
+            "jerk": peak.jerk_ticks_s3,
+            "limit": peak.limit_ticks_s3,
             "share": peak.share,
             "share_p999": peak.share_p999,
         })),
@@ -232,7 +232,7 @@ fn details(certificate: &Certificate) -> String {
         }
         text.push('\n');
     }
-    if let Some(rounding) = certificate.largest_rounding {
+    if let Some(rounding) = certificate.largest_rounding_ticks {
         let _ = writeln!(text, "  no drift: every row is within {rounding:.3} ticks of the exact position");
     }
     for failure in &certificate.failures {

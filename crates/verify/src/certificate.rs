@@ -19,7 +19,7 @@ pub struct Certificate {
     pub tick_floor: TickFloor,
     /// Largest distance of a row's ticks from the exact motor positions it came with, ticks: at most 1/2 if rounding
     /// never drifts. Nothing when not every row came with them.
-    pub largest_rounding: Option<f64>,
+    pub largest_rounding_ticks: Option<f64>,
     /// The pens that drew, each once, in the order of their first use.
     pub pens: Vec<u16>,
     /// Peaks of each motor, in the order of the columns.
@@ -90,13 +90,13 @@ pub struct MotorPeak {
     /// The motor's name.
     pub name: String,
     /// Largest first difference over time, ticks/s; includes the rounding of both its ticks.
-    pub speed: f64,
+    pub speed_ticks_s: f64,
     /// Largest second difference over time squared, ticks/s²; includes the rounding of its three ticks.
-    pub acceleration: f64,
+    pub acceleration_ticks_s2: f64,
     /// The limit the plan states, ticks/s.
-    pub speed_limit: f64,
+    pub speed_limit_ticks_s: f64,
     /// The limit the plan states, ticks/s².
-    pub acceleration_limit: f64,
+    pub acceleration_limit_ticks_s2: f64,
     /// Largest share of the speed limit with its rounding allowance.
     pub speed_share: f64,
     /// Largest share of the acceleration limit with its rounding allowance.
@@ -115,9 +115,9 @@ pub struct MotorPeak {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JerkPeak {
     /// Largest third difference over time cubed, ticks/s³; includes the rounding of its four ticks.
-    pub jerk: f64,
+    pub jerk_ticks_s3: f64,
     /// The limit the plan states, ticks/s³.
-    pub limit: f64,
+    pub limit_ticks_s3: f64,
     /// Largest share of the limit with its rounding allowance.
     pub share: f64,
     /// 99.9 % of the rows about which this motor moves have a smaller share; overstated by 1/64 of itself at most.

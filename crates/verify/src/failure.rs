@@ -95,42 +95,46 @@ pub enum Violation {
         share: f64,
     },
     /// A motor is too fast.
-    #[error("motor {motor} runs at {speed:.1} ticks/s where {allowed:.1} are allowed (limit {limit:.1})")]
+    #[error(
+        "motor {motor} runs at {speed_ticks_s:.1} ticks/s where {allowed_ticks_s:.1} are allowed (limit {limit_ticks_s:.1})"
+    )]
     Speed {
         /// The motor.
         motor: String,
         /// Its speed, ticks/s.
-        speed: f64,
+        speed_ticks_s: f64,
         /// The limit with the rounding allowance, ticks/s.
-        allowed: f64,
+        allowed_ticks_s: f64,
         /// The limit itself, ticks/s.
-        limit: f64,
+        limit_ticks_s: f64,
     },
     /// A motor accelerates too hard.
     #[error(
-        "motor {motor} accelerates at {acceleration:.1} ticks/s^2 where {allowed:.1} are allowed (limit {limit:.1})"
+        "motor {motor} accelerates at {acceleration_ticks_s2:.1} ticks/s^2 where {allowed_ticks_s2:.1} are allowed (limit {limit_ticks_s2:.1})"
     )]
     Acceleration {
         /// The motor.
         motor: String,
         /// Its acceleration, ticks/s².
-        acceleration: f64,
+        acceleration_ticks_s2: f64,
         /// The limit with the rounding allowance, ticks/s².
-        allowed: f64,
+        allowed_ticks_s2: f64,
         /// The limit itself, ticks/s².
-        limit: f64,
+        limit_ticks_s2: f64,
     },
     /// A third difference is larger than the jerk limit allows.
-    #[error("motor {motor} jerks at {jerk:.1} ticks/s^3 where {allowed:.1} are allowed (limit {limit:.1})")]
+    #[error(
+        "motor {motor} jerks at {jerk_ticks_s3:.1} ticks/s^3 where {allowed_ticks_s3:.1} are allowed (limit {limit_ticks_s3:.1})"
+    )]
     Jerk {
         /// The motor.
         motor: String,
         /// Its jerk, ticks/s³.
-        jerk: f64,
+        jerk_ticks_s3: f64,
         /// The limit with the rounding allowance, ticks/s³.
-        allowed: f64,
+        allowed_ticks_s3: f64,
         /// The limit itself, ticks/s³.
-        limit: f64,
+        limit_ticks_s3: f64,
     },
     /// The motors move before the pen has finished its own movement.
     #[error("the motors move {early_us} us before pen {pen} has been {motion}")]
@@ -194,12 +198,12 @@ pub enum Violation {
         strokes: u64,
     },
     /// A row's ticks are not the exact motor position rounded: an error that adds up.
-    #[error("motor {motor} stands {by:.3} ticks from its exact position, rounding explains 0.5")]
+    #[error("motor {motor} stands {by_ticks:.3} ticks from its exact position, rounding explains 0.5")]
     Drift {
         /// The motor.
         motor: String,
         /// The difference, ticks.
-        by: f64,
+        by_ticks: f64,
     },
     /// A position or distance that is no finite number.
     #[error("a position is not a finite number")]

@@ -216,7 +216,12 @@ impl<'a> Verifier<'a> {
             let by = (row.ticks[index] as f64 - exact[index]).abs();
             self.largest_rounding = self.largest_rounding.max(by);
             if by > 0.5 + 1e-6 {
-                self.failures.note(Violation::Drift { motor: motor.name().to_owned(), by }, index, by, here);
+                self.failures.note(
+                    Violation::Drift { motor: motor.name().to_owned(), by_ticks: by },
+                    index,
+                    by,
+                    here,
+                );
             }
         }
     }
@@ -256,9 +261,9 @@ impl<'a> Verifier<'a> {
                 let limit = self.motors[motor].limits().speed;
                 let violation = Violation::Speed {
                     motor: self.motors[motor].name().to_owned(),
-                    speed: excess.value,
-                    allowed: excess.allowed,
-                    limit,
+                    speed_ticks_s: excess.value,
+                    allowed_ticks_s: excess.allowed,
+                    limit_ticks_s: limit,
                 };
                 self.failures.note(violation, motor, excess.share(), here);
             }
@@ -302,18 +307,18 @@ impl<'a> Verifier<'a> {
     fn acceleration(&self, motor: usize, excess: Excess) -> Violation {
         Violation::Acceleration {
             motor: self.motors[motor].name().to_owned(),
-            acceleration: excess.value,
-            allowed: excess.allowed,
-            limit: self.motors[motor].limits().acceleration,
+            acceleration_ticks_s2: excess.value,
+            allowed_ticks_s2: excess.allowed,
+            limit_ticks_s2: self.motors[motor].limits().acceleration,
         }
     }
 
     fn jerk(&self, motor: usize, excess: Excess) -> Violation {
         Violation::Jerk {
             motor: self.motors[motor].name().to_owned(),
-            jerk: excess.value,
-            allowed: excess.allowed,
-            limit: self.motors[motor].limits().jerk.unwrap_or_default(),
+            jerk_ticks_s3: excess.value,
+            allowed_ticks_s3: excess.allowed,
+            limit_ticks_s3: self.motors[motor].limits().jerk.unwrap_or_default(),
         }
     }
 
@@ -399,7 +404,7 @@ impl<'a> Verifier<'a> {
             holds: failures.is_empty(),
             failures,
             tolerance_mm: self.tolerance,
-            largest_rounding: before_rounding.as_ref().map(|_| self.largest_rounding),
+            largest_rounding_ticks: before_rounding.as_ref().map(|_| self.largest_rounding),
             before_rounding: before_rounding.map(|(deviation, _)| deviation),
             after_rounding,
             tick_floor,

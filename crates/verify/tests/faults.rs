@@ -56,7 +56,7 @@ fn a_good_plan_holds_on_a_cartesian_machine() {
     assert!((certificate.ink_mm - ink).abs() < 1e-3, "{} instead of {ink}", certificate.ink_mm);
     assert!((certificate.tick_floor.worst_mm - 0.005 * 2.0_f64.sqrt()).abs() < 1e-12);
     assert!((certificate.tick_floor.rms_mm - 0.01 / 6.0_f64.sqrt()).abs() < 1e-12);
-    assert!(certificate.largest_rounding.expect("exact positions") <= 0.5);
+    assert!(certificate.largest_rounding_ticks.expect("exact positions") <= 0.5);
     for motor in &certificate.motors {
         assert!(motor.speed_share <= 1.0 && motor.acceleration_share <= 1.0, "{motor:?}");
         assert!(motor.acceleration_share > 0.5 && motor.acceleration_share_p999 > 0.5, "{motor:?}");
@@ -69,7 +69,7 @@ fn a_good_plan_holds_without_exact_positions() {
     let machine = cartesian();
     let certificate = good(&machine).verify_as(&picture(), TOLERANCE, false);
     assert!(certificate.holds, "{:#?}", sentences(&certificate));
-    assert!(certificate.before_rounding.is_none() && certificate.largest_rounding.is_none());
+    assert!(certificate.before_rounding.is_none() && certificate.largest_rounding_ticks.is_none());
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn too_fast_by_five_percent() {
     let mut plotter = Plotter::new(&machine);
     plotter.stroke(1, SQUARE).stroke(2, SLANT).stroke(1, DOT).park();
     let mut header = common::header(&machine);
-    let peak = |certificate: &Certificate| certificate.motors[0].speed;
+    let peak = |certificate: &Certificate| certificate.motors[0].speed_ticks_s;
     let fastest = peak(&plotter.verify(&picture(), TOLERANCE));
     header.motors[0].limits.speed = (fastest - 1.0 / 0.01) / 1.05;
     let mut verifier = verify::Verifier::new(&machine, &picture(), &header, TOLERANCE);
