@@ -9,12 +9,14 @@
 
 mod arc;
 mod clip;
+mod hatch;
 mod lattice;
 mod segment;
 mod stroke;
 
 pub use arc::EllipticArc;
 pub use clip::clip_segment;
+pub use hatch::{FillRule, HatchGrid, HatchLine};
 pub use kurbo::{Affine, CubicBez, Line, Point, Rect, Vec2};
 pub use lattice::Pitch;
 pub use segment::Segment;

@@ -35,6 +35,7 @@ use std::collections::BTreeMap;
 pub use diagnostics::{Code, Diagnostic, Severity};
 pub use drawing::{Drawing, Pen, Point, Span};
 pub use emit::{EmitOptions, Encoding, emit};
+pub use fonts::{CAP_HEIGHT as FONT_CAP_HEIGHT, Glyph};
 pub use interpreter::interpret;
 pub use mnemonics::all as known_commands;
 pub use producers::producer;

@@ -6,21 +6,21 @@ mod newstroke;
 pub(crate) use encodings::CharacterSet;
 
 /// Height of capitals, units of the font.
-pub(crate) const CAP_HEIGHT: f64 = 21.0;
+pub const CAP_HEIGHT: f64 = 21.0;
 /// Width of wide capitals such as A, units of the font: what plotters call the width of a character.
 pub(crate) const BODY_WIDTH: f64 = 14.0;
 
 /// A character as strokes. The base line is at 0, y goes up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Glyph {
+pub struct Glyph {
     /// From this character's origin to the next one's where characters have widths of their own.
-    pub(crate) advance: f64,
+    pub advance: f64,
     strokes: &'static str,
 }
 
 impl Glyph {
     /// The glyph of a character, if the font has it.
-    pub(crate) fn of(character: char) -> Option<Self> {
+    pub fn of(character: char) -> Option<Self> {
         let glyphs = newstroke::GLYPHS;
         let index = glyphs.binary_search_by_key(&character, |glyph| glyph.0).ok()?;
         let (_, advance, strokes) = glyphs[index];
@@ -38,7 +38,7 @@ impl Glyph {
     }
 
     /// Its strokes, each as points in units of the font.
-    pub(crate) fn strokes(self) -> impl Iterator<Item = impl Iterator<Item = (f64, f64)>> {
+    pub fn strokes(self) -> impl Iterator<Item = impl Iterator<Item = (f64, f64)>> {
         let unit = |byte: u8| f64::from(byte) - f64::from(b'R');
         self.strokes.split(' ').filter(|stroke| !stroke.is_empty()).map(move |stroke| {
             stroke.as_bytes().chunks_exact(2).map(move |pair| (unit(pair[0]), unit(pair[1])))

@@ -4,16 +4,13 @@
 //! paper that they cover. Lines lie on a grid through the anchor corner, so that neighbouring areas match, are cut at the
 //! area's edges, and are drawn to and fro.
 
-use drawing::{Affine, Point, Vec2};
+use drawing::{Affine, FillRule, HatchGrid, HatchLine, Point, Vec2};
 
 use super::Interpreter;
-use super::polygon::Outline;
 use crate::codes;
 
 /// Thickness of a pen that no `PT` or `PW` tells, mm.
 const DEFAULT_PEN_MM: f64 = 0.3;
-/// How far chords may leave curved edges where hatch lines are cut at them, mm.
-const FLATTENING: f64 = 0.005;
 /// Shares of paper that raster fills and patterns of printers are taken for.
 const RASTER_SHARE: f64 = 0.25;
 
@@ -169,6 +166,7 @@ impl Interpreter {
         if hatches.is_empty() {
             return;
         }
+        let rule = if non_zero { FillRule::NonZero } else { FillRule::EvenOdd };
         self.ink();
         self.tracer.finish();
         // Solid fills and shades are areas, not lines: a line type does not break them.
@@ -177,14 +175,16 @@ impl Interpreter {
         let anchor = self.frame.mm_of_plu(self.fill.anchor);
         for hatch in hatches {
             let direction = self.frame.direction_mm(hatch.angle);
-            let grid = Grid { anchor, direction, spacing: hatch.spacing_mm };
-            let Some(lines) = grid.lines(self.polygon.outlines(), non_zero, &mut self.pieces_left) else {
+            let grid = HatchGrid { anchor, direction, spacing_mm: hatch.spacing_mm };
+            let pieces = self.polygon.outlines().iter().flat_map(|outline| &outline.pieces);
+            let lines = grid.lines(pieces.map(|(segment, _)| segment), rule, &mut self.pieces_left);
+            let Some(lines) = lines else {
                 self.report(codes::TOO_MANY_PIECES, || {
                     "the hatch is too fine for an area of this size: it is not filled".into()
                 });
                 break;
             };
-            for (row, from, to) in lines {
+            for HatchLine { row, from, to } in lines {
                 if dashed {
                     self.tracer.swap_dashes(dashes.as_ref().map(super::line_type::Dashes::restarted));
                 }
@@ -195,93 +195,6 @@ impl Interpreter {
             }
         }
         self.tracer.swap_dashes(dashes);
-    }
-}
-
-/// Parallel lines on the page.
-#[derive(Clone, Copy, Debug)]
-struct Grid {
-    /// A point that a line goes through, mm.
-    anchor: Point,
-    /// A unit vector.
-    direction: Vec2,
-    /// Distance of neighbouring lines, mm.
-    spacing: f64,
-}
-
-impl Grid {
-    /// The parts of the lines inside the outlines, with the number of their line, in the order to draw them: line by line,
-    /// every other one from its end; nothing where there would be more pieces than are left.
-    ///
-    /// In coordinates along and across the lines, with the spacing as unit across, line `k` is crossed by an edge where
-    /// one end lies below `k` and the other does not (so that corners count once). Sorted along the line, the
-    /// crossings tell inside from outside by their parity or by the sum of their directions.
-    fn lines(
-        self,
-        outlines: &[Outline],
-        non_zero: bool,
-        pieces_left: &mut u64,
-    ) -> Option<Vec<(i64, Point, Point)>> {
-        let across = Vec2::new(-self.direction.y, self.direction.x);
-        let mut crossings: Vec<(i64, f64, i32)> = Vec::new();
-        for outline in outlines {
-            for (segment, _) in &outline.pieces {
-                let mut from = self.coordinates(across, segment.start());
-                let mut enough = true;
-                segment.flatten(FLATTENING, |to| {
-                    let to = self.coordinates(across, to);
-                    let (low, high, sense) = if from.y < to.y { (from, to, 1) } else { (to, from, -1) };
-                    let (first, last) = (low.y.ceil(), high.y.ceil());
-                    let count = last - first;
-                    if enough && count > 0.0 {
-                        enough = count <= *pieces_left as f64;
-                        if enough {
-                            *pieces_left -= count as u64;
-                            for step in 0..count as i64 {
-                                let k = first + step as f64;
-                                let x = low.x + (high.x - low.x) * (k - low.y) / (high.y - low.y);
-                                crossings.push((k as i64, x, sense));
-                            }
-                        }
-                    }
-                    from = to;
-                });
-                if !enough {
-                    return None;
-                }
-            }
-        }
-        crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let mut lines = Vec::new();
-        for row in crossings.chunk_by(|a, b| a.0 == b.0) {
-            let begun = lines.len();
-            let (mut winding, mut from) = (0, 0.0);
-            for &(k, x, sense) in row {
-                let inside = |winding: i32| if non_zero { winding != 0 } else { winding % 2 != 0 };
-                let was = inside(winding);
-                winding += if non_zero { sense } else { 1 };
-                match (was, inside(winding)) {
-                    (false, true) => from = x,
-                    (true, false) if x > from => {
-                        lines.push((k, self.point(across, from, k), self.point(across, x, k)));
-                    }
-                    _ => {}
-                }
-            }
-            if row[0].0.rem_euclid(2) == 1 {
-                lines[begun..].reverse();
-            }
-        }
-        Some(lines)
-    }
-
-    fn coordinates(self, across: Vec2, p: Point) -> Point {
-        let v = p - self.anchor;
-        Point::new(v.dot(self.direction), v.dot(across) / self.spacing)
-    }
-
-    fn point(self, across: Vec2, x: f64, k: i64) -> Point {
-        self.anchor + x * self.direction + k as f64 * self.spacing * across
     }
 }
 
