@@ -11,7 +11,9 @@ use backends::Ink;
 use backends::device::{Device, Ebb, Grbl};
 use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::{Affine, Drawing, Rect};
-use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar};
+use kinematics::{
+    Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, MotorPos, PenLimits, Polar,
+};
 use plan::{Header, Limits, Row, TickTable};
 use serde_json::Value;
 use verify::{Certificate, Verifier};
@@ -73,24 +75,29 @@ fn ruler(geometry: Geometry) -> Machine {
     let angle = geometry.joint_is_angle()[0];
     let motor = |name: &str, counts: f64| Motor {
         name: name.into(),
-        counts,
-        offset: 0.0,
-        max_speed: 1e9,
-        max_acceleration: 1e12,
-        max_jerk: None,
+        ticks_per_unit: counts,
+        offset_ticks: 0.0,
+        max_speed_ticks_s: 1e9,
+        max_acceleration_ticks_s2: 1e12,
+        max_jerk_ticks_s3: None,
     };
     let first = if angle { FINE.to_degrees() } else { FINE };
     Machine::new(MachineParts {
         name: "ruler".into(),
         geometry,
         joints: [Joint::FREE; 2],
-        min_dexterity: 0.0,
+        min_manipulability: 0.0,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: [motor("a", first), motor("b", FINE)],
-        pen: PenLift { max_speed: 1e9, max_travel_speed: f64::INFINITY, lift_time: 0.0, drop_time: 0.0 },
+        pen: PenLimits {
+            max_speed_mm_s: 1e9,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.0,
+            drop_time_s: 0.0,
+        },
         sheet: Rect::new(0.0, 0.0, 1.0, 1.0),
-        start: Joints::new(0.5, 100.0),
-        period: 0.01,
+        start: JointPos::new(0.5, 100.0),
+        period_s: 0.01,
     })
     .expect("a sound machine")
 }
@@ -642,7 +649,7 @@ fn a_trajectory_controller_draws_its_quintics() {
                     let c5 = 6.0 * (p1 - p0) - 3.0 * (v0 + v1) - 0.5 * (a0 - a1);
                     p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
                 });
-                let at = machine.geometry().forward(&Joints::from(joints));
+                let at = machine.geometry().forward(&JointPos::from(joints));
                 samples.push((pen, [at.x, at.y]));
             }
         }
@@ -660,7 +667,7 @@ fn streamers_and_servo_drives_draw_the_plan() {
     for name in ["coaxial", "hbot", "polar"] {
         let machine = preset(name);
         let at = |ticks: Point| {
-            let p = machine.pen_at(&Joints::from(ticks));
+            let p = machine.forward_from_motors(&MotorPos::from(ticks));
             [p.x, p.y]
         };
         for period in ["1ms", "10ms"] {

@@ -3,7 +3,7 @@
 
 use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::Point;
-use kinematics::{Joints, Machine};
+use kinematics::{JointPos, Machine, MotorPos};
 
 fn preset(name: &str) -> Machine {
     let preset = PRESETS.iter().find(|preset| preset.name == name).expect("a preset of this name");
@@ -13,12 +13,12 @@ fn preset(name: &str) -> Machine {
 /// Exact motor positions with the pen at (x, y) mm, in the whole turn of the start pose.
 fn ticks(machine: &Machine, x: f64, y: f64) -> [f64; 2] {
     let pose = machine.pose_near(Point::new(x, y), &machine.start()).expect("within reach");
-    machine.ticks(&pose).into()
+    machine.motor_positions(&pose).into()
 }
 
 /// Where the pen is with the motors at `ticks`, mm.
 fn pen(machine: &Machine, ticks: [f64; 2]) -> [f64; 2] {
-    let point = machine.pen_at(&Joints::from(ticks));
+    let point = machine.forward_from_motors(&MotorPos::from(ticks));
     [point.x, point.y]
 }
 
@@ -74,7 +74,7 @@ mod coaxial {
     #[test]
     fn it_starts_straight_up() {
         let machine = preset("coaxial");
-        let start: [f64; 2] = machine.ticks(&machine.start()).into();
+        let start: [f64; 2] = machine.motor_positions(&machine.start()).into();
         assert!(near(start, counts([90.0, 0.0]), 1e-9), "{start:?}");
         assert!(near(start, [800.0, 0.0], 1e-9), "{start:?}");
         assert!(near(pen(&machine, start), [0.0, 206.0 + 256.0], 1e-9));
@@ -107,10 +107,10 @@ mod coaxial {
         #[test]
         fn the_fold_follows_the_first_arm(first in 0.0..1600.0, second in 0.0..1600.0, by in -800.0..800.0_f64) {
             let machine = preset("coaxial");
-            let joints = |arm1: f64| machine.joints(&Joints::from([arm1, second]));
+            let joints = |arm1: f64| machine.joint_positions(&MotorPos::from([arm1, second]));
             let (before, after) = (joints(first), joints(first + by));
-            let fold = |q: Joints| (q[0] - q[1]).to_degrees();
-            let th1 = |q: Joints| q[0].to_degrees();
+            let fold = |q: JointPos| (q[0] - q[1]).to_degrees();
+            let th1 = |q: JointPos| q[0].to_degrees();
             prop_assert!((th1(after) - th1(before) - by * 360.0 / CPR).abs() < 1e-9);
             prop_assert!((fold(after) - fold(before) - (th1(after) - th1(before))).abs() < 1e-9);
         }
@@ -143,7 +143,7 @@ mod hbot {
         let corners = [(0.0, 0.0), (250.0, 0.0), (250.0, 250.0), (0.0, 250.0)];
         let counts = corners.map(|(x, y)| ticks(&machine, x, y).map(f64::round));
         assert_eq!(counts, [[0.0, 3100.0], [3100.0, 0.0], [6200.0, 3100.0], [3100.0, 6200.0]]);
-        assert_eq!(machine.ticks(&machine.start()).as_slice(), [0.0, 3100.0], "homed at the lower left");
+        assert_eq!(machine.motor_positions(&machine.start()).0, [0.0, 3100.0], "homed at the lower left");
     }
 }
 
@@ -168,7 +168,7 @@ mod corexy {
     #[test]
     fn the_datum_is_zero() {
         let machine = preset("corexy");
-        assert_eq!(machine.ticks(&machine.start()).as_slice(), [0.0, 0.0]);
+        assert_eq!(machine.motor_positions(&machine.start()).0, [0.0, 0.0]);
         assert_eq!(pen(&machine, [0.0, 0.0]), [0.0, 0.0]);
     }
 }

@@ -11,7 +11,7 @@ use std::time::Duration;
 use assert_cmd::cargo::cargo_bin;
 use backends::Ink;
 use compiler::machine_file::{MachineFile, PRESETS};
-use kinematics::{Joints, Machine};
+use kinematics::{Machine, MotorPos};
 use plan::TickTable;
 use tempfile::TempDir;
 
@@ -132,7 +132,7 @@ fn wanted(protocol: &str, plan: &TickTable) -> Lines {
     let machine = machine();
     let start = plan.rows[0].ticks;
     let place = |ticks: [i64; 2]| {
-        let at = machine.pen_at(&Joints::from(ticks.map(|ticks| ticks as f64)));
+        let at = machine.forward_from_motors(&MotorPos::from(ticks.map(|ticks| ticks as f64)));
         let rounded = |unit: f64| [at.x, at.y].map(|mm| (mm * unit).round() / unit);
         match protocol {
             "xy-serial" => rounded(10.0),

@@ -5,7 +5,8 @@
 
 use drawing::Rect;
 use kinematics::{
-    Cartesian, Geometry, Joint, Joints, Machine, MachineError, MachineParts, Motor, PenLift, Polar, TwoLink,
+    Cartesian, Geometry, Joint, JointPos, Machine, MachineError, MachineParts, Motor, PenLimits, Polar,
+    TwoLink,
 };
 use serde::{Deserialize, Serialize};
 
@@ -279,7 +280,7 @@ impl MachineFile {
                 max: value(&range.max, "max", f64::INFINITY)?,
             };
         }
-        let mut start = Joints::zeros();
+        let mut start = JointPos::ZERO;
         for (k, value) in self.start.of("start", &geometry)?.into_iter().enumerate() {
             let text = value.ok_or_else(|| {
                 MachineFileError::Invalid(format!("[start] does not say where joint {} is", names[k]))
@@ -306,21 +307,22 @@ impl MachineFile {
             name: self.name.clone(),
             geometry,
             joints,
-            min_dexterity,
+            min_manipulability: min_dexterity,
             coupling: self.coupling.matrix,
             motors: [first.motor()?, second.motor()?],
-            pen: PenLift {
-                max_speed: quantity::speed_mm_s(&self.pen.max_speed).map_err(at("pen.max_speed".into()))?,
-                max_travel_speed: match &self.pen.max_travel_speed {
+            pen: PenLimits {
+                max_speed_mm_s: quantity::speed_mm_s(&self.pen.max_speed)
+                    .map_err(at("pen.max_speed".into()))?,
+                max_travel_speed_mm_s: match &self.pen.max_travel_speed {
                     Some(speed) => quantity::speed_mm_s(speed).map_err(at("pen.max_travel_speed".into()))?,
                     None => f64::INFINITY,
                 },
-                lift_time: time(&self.pen.lift_time, "pen.lift_time")?,
-                drop_time: time(&self.pen.drop_time, "pen.drop_time")?,
+                lift_time_s: time(&self.pen.lift_time, "pen.lift_time")?,
+                drop_time_s: time(&self.pen.drop_time, "pen.drop_time")?,
             },
             sheet: Rect { x0: x, y0: y, x1: x + width, y1: y + height },
             start,
-            period: time(&self.plan.period, "plan.period")?,
+            period_s: time(&self.plan.period, "plan.period")?,
         })?)
     }
 
@@ -352,11 +354,11 @@ impl MotorTable {
             |text: &str, power, key| quantity::rate_ticks(text, power, counts, dimension).map_err(at(key));
         Ok(Motor {
             name: self.name.clone(),
-            counts,
-            offset: self.offset,
-            max_speed: rate(&self.max_speed, 1, "max_speed")?,
-            max_acceleration: rate(&self.max_acceleration, 2, "max_acceleration")?,
-            max_jerk: self.max_jerk.as_deref().map(|text| rate(text, 3, "max_jerk")).transpose()?,
+            ticks_per_unit: counts,
+            offset_ticks: self.offset,
+            max_speed_ticks_s: rate(&self.max_speed, 1, "max_speed")?,
+            max_acceleration_ticks_s2: rate(&self.max_acceleration, 2, "max_acceleration")?,
+            max_jerk_ticks_s3: self.max_jerk.as_deref().map(|text| rate(text, 3, "max_jerk")).transpose()?,
         })
     }
 }

@@ -1,7 +1,7 @@
 //! From a drawing to a certified plan: each room's work, one after the other.
 
 use drawing::{Affine, Drawing, Pen, Point, Rect, Segment};
-use kinematics::{Joints, Machine};
+use kinematics::{JointPos, Machine};
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
 use planner::{Law, PlanError, Settings, Trajectory};
@@ -101,11 +101,11 @@ struct TravelTime<'a>(&'a Machine);
 impl ordering::Cost for TravelTime<'_> {
     fn to_cost_space(&self, point: Point) -> ordering::CostPoint {
         let pose = planner::travel_pose(self.0, point).unwrap_or(self.0.start());
-        [pose.x, pose.y]
+        [pose[0], pose[1]]
     }
 
     fn between_cost_points(&self, a: ordering::CostPoint, b: ordering::CostPoint) -> f64 {
-        planner::travel_time(self.0, &Joints::from(a), &Joints::from(b))
+        planner::travel_time(self.0, &JointPos::from(a), &JointPos::from(b))
     }
 }
 
@@ -156,9 +156,9 @@ pub fn compile<'a>(
         motors: machine.motors().clone().map(|motor| Motor {
             name: motor.name,
             limits: Limits {
-                speed: motor.max_speed,
-                acceleration: motor.max_acceleration,
-                jerk: motor.max_jerk,
+                speed: motor.max_speed_ticks_s,
+                acceleration: motor.max_acceleration_ticks_s2,
+                jerk: motor.max_jerk_ticks_s3,
             },
         }),
         placement: placement.as_coeffs(),

@@ -38,23 +38,17 @@ impl Coupling {
         }
     }
 
-    /// `C`.
-    pub fn matrix(&self) -> &Matrix2<f64> {
-        &self.matrix
+    /// The rows of `C`, one per motor.
+    pub fn rows(&self) -> [[f64; 2]; 2] {
+        let m = &self.matrix;
+        [[m.m11, m.m12], [m.m21, m.m22]]
     }
 
-    /// The inverse of `C`.
-    pub fn inverse(&self) -> &Matrix2<f64> {
-        &self.inverse
-    }
-
-    /// `C q`.
-    pub fn motors(&self, joints: Vector2<f64>) -> Vector2<f64> {
-        self.matrix * joints
-    }
-
-    /// The joints at which `C q` equals `motors`.
-    pub fn joints(&self, motors: Vector2<f64>) -> Vector2<f64> {
-        self.inverse * motors
+    /// `diag(ticks_per_unit) C`, from joints to motor ticks, and its inverse.
+    pub(crate) fn scaled(&self, ticks_per_unit: [f64; 2]) -> (Matrix2<f64>, Matrix2<f64>) {
+        let scale = Vector2::from(ticks_per_unit);
+        let to_ticks = Matrix2::from_diagonal(&scale) * self.matrix;
+        let from_ticks = self.inverse * Matrix2::from_diagonal(&scale.map(|ticks| 1.0 / ticks));
+        (to_ticks, from_ticks)
     }
 }

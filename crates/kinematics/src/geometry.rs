@@ -5,14 +5,12 @@ mod polar;
 mod two_link;
 
 use drawing::{Point, Vec2};
-use nalgebra::{Matrix2, Vector2};
 
 pub use cartesian::Cartesian;
 pub use polar::Polar;
 pub use two_link::TwoLink;
 
-/// The two geometric joints, in mm or rad as the geometry says.
-pub type Joints = Vector2<f64>;
+use crate::JointPos;
 
 /// Why a point has no pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,31 +47,37 @@ macro_rules! each {
 
 impl Geometry {
     /// Forward kinematics: where the pen is, mm.
-    pub fn forward(&self, q: &Joints) -> Point {
+    pub fn forward(&self, q: &JointPos) -> Point {
         each!(self, g => g.forward(q))
     }
 
-    /// Inverse kinematics: the joints that hold the pen at `p`, angles in (-pi, pi] as they come; see [`Self::turn`].
+    /// Inverse kinematics: the joints that hold the pen at `p`, angles in (-pi, pi] as they come; see [`Self::full_rotation`].
     ///
     /// # Errors
     /// When no pose reaches the point.
-    pub fn inverse(&self, p: Point) -> Result<Joints, Unreachable> {
+    pub fn inverse(&self, p: Point) -> Result<JointPos, Unreachable> {
         each!(self, g => g.inverse(p))
     }
 
     /// The Jacobian of [`Self::forward`]: columns are the pen's velocity per unit of each joint's.
-    pub fn jacobian(&self, q: &Joints) -> Matrix2<f64> {
+    pub fn jacobian(&self, q: &JointPos) -> [Vec2; 2] {
         each!(self, g => g.jacobian(q))
+    }
+
+    /// The pen's velocity at pose `q` while the joints move at `rates`: the Jacobian times them.
+    pub fn pen_velocity(&self, q: &JointPos, rates: &JointPos) -> Vec2 {
+        let [first, second] = self.jacobian(q);
+        first * rates[0] + second * rates[1]
     }
 
     /// First and second derivative of the joints along a path on which the pen, at pose `q`, has the derivatives
     /// `first` (mm) and `second` (mm) by the path's parameter. Infinite or not a number at a singular pose.
-    pub fn path_derivatives(&self, q: &Joints, first: Vec2, second: Vec2) -> (Joints, Joints) {
+    pub fn path_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
         each!(self, g => g.path_derivatives(q, first, second))
     }
 
     /// Third derivative of the joints along such a path, on which the pen also has the derivative `third` (mm).
-    pub fn path_third_derivative(&self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Joints {
+    pub fn path_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> JointPos {
         each!(self, g => g.path_third_derivative(q, first, second, third))
     }
 
@@ -83,22 +87,22 @@ impl Geometry {
     /// A function whose second derivative is bounded by `B` leaves the chord between its ends by `u (1 - u) B / 2`, so
     /// by `B / 8` at the most: this is what proves that linear motion of the motors stays on a straight line. `from`
     /// and `to` may also be (a pose, the pose plus joint speeds): then the bound is that of d²p/dt² at even speed.
-    pub fn bend(&self, from: &Joints, to: &Joints) -> f64 {
-        each!(self, g => g.bend(from, to))
+    pub fn second_derivative_bound(&self, from: &JointPos, to: &JointPos) -> f64 {
+        each!(self, g => g.second_derivative_bound(from, to))
     }
 
     /// How far from a singular pose: 0 there, at most 1.
-    pub fn dexterity(&self, q: &Joints) -> f64 {
-        each!(self, g => g.dexterity(q))
+    pub fn manipulability(&self, q: &JointPos) -> f64 {
+        each!(self, g => g.manipulability(q))
     }
 
     /// The joints' change over one whole turn of the machine about its base, where that is a thing: the pose is the same.
-    pub fn turn(&self) -> Option<Joints> {
+    pub fn full_rotation(&self) -> Option<JointPos> {
         let turn = std::f64::consts::TAU;
         match self {
             Self::Cartesian(_) => None,
-            Self::TwoLink(_) => Some(Joints::new(turn, turn)),
-            Self::Polar(_) => Some(Joints::new(turn, 0.0)),
+            Self::TwoLink(_) => Some(JointPos::new(turn, turn)),
+            Self::Polar(_) => Some(JointPos::new(turn, 0.0)),
         }
     }
 

@@ -1,9 +1,11 @@
 //! A whole machine: geometry, coupling, motors, limits, pen and sheet.
 
 use drawing::{Point, Rect, Vec2};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Matrix2;
 
-use crate::{Coupling, Fault, Geometry, Joints, SingularCoupling, Unreachable, reach::CHORD_TOLERANCE};
+use crate::{
+    Coupling, Fault, Geometry, JointPos, MotorPos, SingularCoupling, Unreachable, reach::CHORD_TOLERANCE,
+};
 
 /// The allowed range of one joint, rad or mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,28 +27,28 @@ pub struct Motor {
     /// Heads the motor's column in a plan.
     pub name: String,
     /// Ticks per unit (rad or mm) of this motor's row of `C q`; negative for a motor that counts the other way.
-    pub counts: f64,
+    pub ticks_per_unit: f64,
     /// Ticks where that row is 0.
-    pub offset: f64,
+    pub offset_ticks: f64,
     /// Largest speed, ticks/s.
-    pub max_speed: f64,
+    pub max_speed_ticks_s: f64,
     /// Largest acceleration, ticks/s².
-    pub max_acceleration: f64,
+    pub max_acceleration_ticks_s2: f64,
     /// Largest jerk, ticks/s³, where the machine states one.
-    pub max_jerk: Option<f64>,
+    pub max_jerk_ticks_s3: Option<f64>,
 }
 
 /// What the pen itself allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PenLift {
+pub struct PenLimits {
     /// Largest speed of the pen over the paper while it draws, mm/s.
-    pub max_speed: f64,
+    pub max_speed_mm_s: f64,
     /// Largest speed of the pen while it travels, mm/s; infinite where only the motors limit it.
-    pub max_travel_speed: f64,
+    pub max_travel_speed_mm_s: f64,
     /// How long lifting takes, s: the motors stand still.
-    pub lift_time: f64,
+    pub lift_time_s: f64,
     /// How long lowering takes, s: the motors stand still.
-    pub drop_time: f64,
+    pub drop_time_s: f64,
 }
 
 /// What a machine is made of, before it was checked.
@@ -58,20 +60,20 @@ pub struct MachineParts {
     pub geometry: Geometry,
     /// Allowed ranges of the joints.
     pub joints: [Joint; 2],
-    /// No pen-down pose may have a smaller [`Geometry::dexterity`].
-    pub min_dexterity: f64,
+    /// No pen-down pose may have a smaller [`Geometry::manipulability`].
+    pub min_manipulability: f64,
     /// Rows of the coupling matrix, one a motor.
     pub coupling: [[f64; 2]; 2],
     /// The motors.
     pub motors: [Motor; 2],
     /// The pen.
-    pub pen: PenLift,
+    pub pen: PenLimits,
     /// The sheet in machine mm; its lower-left corner is the drawing's (0, 0) unless told otherwise.
     pub sheet: Rect,
     /// The pose in which every plan starts, and ends unless told otherwise.
-    pub start: Joints,
+    pub start: JointPos,
     /// Time between the rows of a plan, s, unless told otherwise.
-    pub period: f64,
+    pub period_s: f64,
 }
 
 /// Why a machine cannot be.
@@ -107,10 +109,10 @@ pub enum MachineError {
 pub struct Machine {
     parts: MachineParts,
     coupling: Coupling,
-    /// diag(counts) C and its inverse: joints to ticks (less the offset) and back.
+    /// `diag(ticks_per_unit) C` and its inverse: joints to ticks (less the offset) and back.
     to_ticks: Matrix2<f64>,
     from_ticks: Matrix2<f64>,
-    offset: Vector2<f64>,
+    offset: MotorPos,
 }
 
 impl Machine {
@@ -135,44 +137,42 @@ impl Machine {
         for motor in &parts.motors {
             let of = |what: &str| format!("{what} of motor {}", motor.name);
             require(!motor.name.is_empty(), "a motor has no name")?;
-            positive(&of("the size of counts"), motor.counts.abs())?;
-            positive(&of("max_speed"), motor.max_speed)?;
-            positive(&of("max_acceleration"), motor.max_acceleration)?;
-            if let Some(jerk) = motor.max_jerk {
+            positive(&of("the size of counts"), motor.ticks_per_unit.abs())?;
+            positive(&of("max_speed"), motor.max_speed_ticks_s)?;
+            positive(&of("max_acceleration"), motor.max_acceleration_ticks_s2)?;
+            if let Some(jerk) = motor.max_jerk_ticks_s3 {
                 positive(&of("max_jerk"), jerk)?;
             }
-            require(motor.offset.is_finite(), &of("offset must be finite"))?;
+            require(motor.offset_ticks.is_finite(), &of("offset must be finite"))?;
         }
         require(parts.motors[0].name != parts.motors[1].name, "both motors have the same name")?;
-        positive("the pen's max_speed", parts.pen.max_speed)?;
-        let travel = parts.pen.max_travel_speed;
+        positive("the pen's max_speed", parts.pen.max_speed_mm_s)?;
+        let travel = parts.pen.max_travel_speed_mm_s;
         require(travel > 0.0, "the pen's max_travel_speed must be a positive number")?;
-        for (what, time) in [("lift_time", parts.pen.lift_time), ("drop_time", parts.pen.drop_time)] {
+        for (what, time) in [("lift_time", parts.pen.lift_time_s), ("drop_time", parts.pen.drop_time_s)] {
             require(
                 (0.0..=3600.0).contains(&time),
                 &format!("the pen's {what} must be between 0 and 3600 s"),
             )?;
         }
-        positive("period", parts.period)?;
-        require((1e-6..=10.0).contains(&parts.period), "period must be between 1 us and 10 s")?;
+        positive("period", parts.period_s)?;
+        require((1e-6..=10.0).contains(&parts.period_s), "period must be between 1 us and 10 s")?;
         require(
             parts.sheet.is_finite() && parts.sheet.width() > 0.0 && parts.sheet.height() > 0.0,
             "the sheet must have a positive width and height",
         )?;
         require(
-            (0.0..1.0).contains(&parts.min_dexterity),
+            (0.0..1.0).contains(&parts.min_manipulability),
             "the smallest dexterity must be from 0 to below 1",
         )?;
         for (joint, name) in parts.joints.iter().zip(parts.geometry.joint_names()) {
             require(joint.min < joint.max, &format!("joint {name}: min must be below max"))?;
         }
         let coupling = Coupling::from_rows(parts.coupling)?;
-        let counts = Vector2::new(parts.motors[0].counts, parts.motors[1].counts);
-        let to_ticks = Matrix2::from_diagonal(&counts) * coupling.matrix();
-        let from_ticks =
-            coupling.inverse() * Matrix2::from_diagonal(&Vector2::new(1.0 / counts.x, 1.0 / counts.y));
-        let offset = Vector2::new(parts.motors[0].offset, parts.motors[1].offset);
-        require(parts.start.iter().all(|q| q.is_finite()), "the start pose must be finite")?;
+        let (to_ticks, from_ticks) =
+            coupling.scaled(parts.motors.each_ref().map(|motor| motor.ticks_per_unit));
+        let offset = MotorPos(parts.motors.each_ref().map(|motor| motor.offset_ticks));
+        require(parts.start.is_finite(), "the start pose must be finite")?;
         let machine = Self { parts, coupling, to_ticks, from_ticks, offset };
         match machine.joint_fault(&machine.parts.start) {
             Some(fault) => Err(MachineError::Start { fault }),
@@ -206,7 +206,7 @@ impl Machine {
     }
 
     /// What its pen allows.
-    pub fn pen(&self) -> &PenLift {
+    pub fn pen(&self) -> &PenLimits {
         &self.parts.pen
     }
 
@@ -216,33 +216,33 @@ impl Machine {
     }
 
     /// The pose in which plans start.
-    pub fn start(&self) -> Joints {
+    pub fn start(&self) -> JointPos {
         self.parts.start
     }
 
     /// Exact motor positions at a pose, in ticks that need not be whole.
-    pub fn ticks(&self, q: &Joints) -> Vector2<f64> {
-        self.to_ticks * q + self.offset
+    pub fn motor_positions(&self, q: &JointPos) -> MotorPos {
+        self.motor_rates(q) + self.offset
     }
 
     /// The pose at which the motors are where they are.
-    pub fn joints(&self, ticks: &Vector2<f64>) -> Joints {
-        self.from_ticks * (ticks - self.offset)
+    pub fn joint_positions(&self, motors: &MotorPos) -> JointPos {
+        self.joint_rates(&(*motors - self.offset))
     }
 
     /// Joint speeds (or accelerations) as motor speeds, ticks/s for rad/s and mm/s.
-    pub fn motor_rates(&self, joint_rates: &Joints) -> Vector2<f64> {
-        self.to_ticks * joint_rates
+    pub fn motor_rates(&self, joint_rates: &JointPos) -> MotorPos {
+        MotorPos(product(&self.to_ticks, joint_rates.0))
     }
 
     /// Motor speeds as joint speeds.
-    pub fn joint_rates(&self, motor_rates: &Vector2<f64>) -> Joints {
-        self.from_ticks * motor_rates
+    pub fn joint_rates(&self, motor_rates: &MotorPos) -> JointPos {
+        JointPos(product(&self.from_ticks, motor_rates.0))
     }
 
-    /// Where the pen is when the motors are at `ticks`, mm.
-    pub fn pen_at(&self, ticks: &Vector2<f64>) -> Point {
-        self.parts.geometry.forward(&self.joints(ticks))
+    /// Where the pen is when the motors are at `motors`, mm.
+    pub fn forward_from_motors(&self, motors: &MotorPos) -> Point {
+        self.parts.geometry.forward(&self.joint_positions(motors))
     }
 
     /// The pose for the point `p`, unwrapped: of all whole turns about the base the one nearest to `near`. Joint limits
@@ -250,11 +250,11 @@ impl Machine {
     ///
     /// # Errors
     /// When no pose reaches the point.
-    pub fn pose_near(&self, p: Point, near: &Joints) -> Result<Joints, Unreachable> {
+    pub fn pose_near(&self, p: Point, near: &JointPos) -> Result<JointPos, Unreachable> {
         let q = self.parts.geometry.inverse(p)?;
-        Ok(match self.parts.geometry.turn() {
+        Ok(match self.parts.geometry.full_rotation() {
             // The first joint is one that turns.
-            Some(turn) => q + turn * ((near.x - q.x) / turn.x).round(),
+            Some(rotation) => q + rotation * ((near[0] - q[0]) / rotation[0]).round(),
             None => q,
         })
     }
@@ -263,14 +263,14 @@ impl Machine {
     ///
     /// # Errors
     /// When there is none.
-    pub fn poses(&self, p: Point, near: &Joints) -> Result<Vec<Joints>, Fault> {
+    pub fn poses(&self, p: Point, near: &JointPos) -> Result<Vec<JointPos>, Fault> {
         let nearest = self.pose_near(p, near)?;
         let mut allowed = Vec::new();
         let mut fault = None;
         let turns: &[f64] =
-            if self.parts.geometry.turn().is_some() { &[0.0, -1.0, 1.0, -2.0, 2.0] } else { &[0.0] };
+            if self.parts.geometry.full_rotation().is_some() { &[0.0, -1.0, 1.0, -2.0, 2.0] } else { &[0.0] };
         for extra in turns {
-            let candidate = nearest + self.parts.geometry.turn().unwrap_or_default() * *extra;
+            let candidate = nearest + self.parts.geometry.full_rotation().unwrap_or_default() * *extra;
             match self.joint_fault(&candidate) {
                 None => allowed.push(candidate),
                 Some(found) => fault = fault.or(Some(found)),
@@ -284,37 +284,37 @@ impl Machine {
 
     /// First and second derivative of the motors' positions (ticks) along a path on which the pen, at pose `q`, has
     /// the derivatives `first` and `second`.
-    pub fn motor_derivatives(&self, q: &Joints, first: Vec2, second: Vec2) -> (Vector2<f64>, Vector2<f64>) {
+    pub fn motor_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (MotorPos, MotorPos) {
         let (q_1, q_2) = self.parts.geometry.path_derivatives(q, first, second);
-        (self.to_ticks * q_1, self.to_ticks * q_2)
+        (self.motor_rates(&q_1), self.motor_rates(&q_2))
     }
 
     /// Third derivative of the motors' positions (ticks) along such a path, on which the pen also has the derivative `third`.
-    pub fn motor_third_derivative(&self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Vector2<f64> {
-        self.to_ticks * self.parts.geometry.path_third_derivative(q, first, second, third)
+    pub fn motor_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> MotorPos {
+        self.motor_rates(&self.parts.geometry.path_third_derivative(q, first, second, third))
     }
 
     /// How far the pen can be from where it should be because motors only take whole ticks: the largest displacement
     /// over half a tick more or less on both motors, mm.
-    pub fn tick_floor(&self, q: &Joints) -> f64 {
+    pub fn quantization_error(&self, q: &JointPos) -> f64 {
         let exact = self.parts.geometry.forward(q);
         [(0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)]
             .into_iter()
             .map(|(a, b)| {
-                let moved = self.parts.geometry.forward(&(q + self.from_ticks * Vector2::new(a, b)));
+                let moved = self.parts.geometry.forward(&(*q + self.joint_rates(&MotorPos::new(a, b))));
                 libm::hypot(moved.x - exact.x, moved.y - exact.y)
             })
             .fold(0.0, f64::max)
     }
 
     /// The joint of `q` that is outside its range, if one is. A rounding error of 1e-9 is forgiven.
-    pub fn joint_fault(&self, q: &Joints) -> Option<Fault> {
+    pub fn joint_fault(&self, q: &JointPos) -> Option<Fault> {
         self.joint_fault_beyond(q, [1e-9, 1e-9])
     }
 
     /// The same for points between those that [`Self::check_segment`] looked at: curves are checked as chords, so a joint
     /// may exceed its range there by what a curve leaves its chord by, seen from no nearer than 10 mm.
-    pub fn joint_fault_between(&self, q: &Joints) -> Option<Fault> {
+    pub fn joint_fault_between(&self, q: &JointPos) -> Option<Fault> {
         let angles = self.parts.geometry.joint_is_angle();
         self.joint_fault_beyond(
             q,
@@ -322,7 +322,7 @@ impl Machine {
         )
     }
 
-    fn joint_fault_beyond(&self, q: &Joints, slack: [f64; 2]) -> Option<Fault> {
+    fn joint_fault_beyond(&self, q: &JointPos, slack: [f64; 2]) -> Option<Fault> {
         let names = self.parts.geometry.joint_names();
         (0..2).find_map(|index| {
             let (joint, value) = (self.parts.joints[index], q[index]);
@@ -336,4 +336,9 @@ impl Machine {
             })
         })
     }
+}
+
+/// `M v`.
+fn product(m: &Matrix2<f64>, [a, b]: [f64; 2]) -> [f64; 2] {
+    [m.m11 * a + m.m12 * b, m.m21 * a + m.m22 * b]
 }

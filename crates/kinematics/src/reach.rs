@@ -26,8 +26,8 @@ pub enum Fault {
     },
     /// Too near to a pose in which the pen cannot move in every direction: a stretched or folded arm, the pole.
     Singular {
-        /// How far from singular the pose is, see [`crate::Geometry::dexterity`].
-        dexterity: f64,
+        /// How far from singular the pose is, see [`crate::Geometry::manipulability`].
+        manipulability: f64,
         /// The least the machine allows.
         min: f64,
     },
@@ -55,9 +55,9 @@ impl std::fmt::Display for Fault {
                     "joint {joint} would be at {value:.2} {unit}, and may be from {min:.2} to {max:.2} {unit}"
                 )
             }
-            Self::Singular { dexterity, min } => write!(
+            Self::Singular { manipulability, min } => write!(
                 f,
-                "the pose there is too nearly singular: an arm stretched or folded, a rail at its pole (dexterity {dexterity:.3}, at least {min:.3} is needed)"
+                "the pose there is too nearly singular: an arm stretched or folded, a rail at its pole (dexterity {manipulability:.3}, at least {min:.3} is needed)"
             ),
         }
     }
@@ -88,8 +88,9 @@ impl Machine {
             Err(fault) => Some(fault),
             Ok(q) => {
                 let limit = self.joint_fault(&q).and_then(|_| self.poses(p, &self.start()).err());
-                let (dexterity, min) = (self.geometry().dexterity(&q), self.parts().min_dexterity);
-                limit.or_else(|| (dexterity < min).then_some(Fault::Singular { dexterity, min }))
+                let (manipulability, min) =
+                    (self.geometry().manipulability(&q), self.parts().min_manipulability);
+                limit.or_else(|| (manipulability < min).then_some(Fault::Singular { manipulability, min }))
             }
         };
         fault.map_or(Ok(()), |fault| Err(OutOfReach { point: p, fault }))

@@ -2,27 +2,39 @@
 
 use drawing::{Line, Point, Rect, Segment, Vec2};
 use kinematics::{
-    Cartesian, Coupling, Fault, Geometry, Joint, Joints, Machine, MachineError, MachineParts, Motor, PenLift,
-    Polar, TwoLink,
+    Cartesian, Coupling, Fault, Geometry, Joint, JointPos, Machine, MachineError, MachineParts, Motor,
+    PenLimits, Polar, TwoLink,
 };
 use proptest::prelude::*;
 
 fn motor(name: &str, counts: f64, offset: f64) -> Motor {
-    Motor { name: name.into(), counts, offset, max_speed: 500.0, max_acceleration: 2500.0, max_jerk: None }
+    Motor {
+        name: name.into(),
+        ticks_per_unit: counts,
+        offset_ticks: offset,
+        max_speed_ticks_s: 500.0,
+        max_acceleration_ticks_s2: 2500.0,
+        max_jerk_ticks_s3: None,
+    }
 }
 
-fn machine(geometry: Geometry, coupling: [[f64; 2]; 2], counts: [f64; 2], start: Joints) -> Machine {
+fn machine(geometry: Geometry, coupling: [[f64; 2]; 2], counts: [f64; 2], start: JointPos) -> Machine {
     Machine::new(MachineParts {
         name: "test".into(),
         geometry,
         joints: [Joint::FREE, Joint::FREE],
-        min_dexterity: 0.1,
+        min_manipulability: 0.1,
         coupling,
         motors: [motor("a", counts[0], 3.0), motor("b", counts[1], -7.0)],
-        pen: PenLift { max_speed: 50.0, max_travel_speed: f64::INFINITY, lift_time: 0.1, drop_time: 0.1 },
+        pen: PenLimits {
+            max_speed_mm_s: 50.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.1,
+            drop_time_s: 0.1,
+        },
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start,
-        period: 0.01,
+        period_s: 0.01,
     })
     .expect("the parts make a machine")
 }
@@ -37,13 +49,13 @@ fn geometry() -> impl Strategy<Value = Geometry> {
 }
 
 /// A pose well inside the geometry's range, on its own elbow branch.
-fn pose(geometry: &Geometry, u: f64, v: f64) -> Joints {
+fn pose(geometry: &Geometry, u: f64, v: f64) -> JointPos {
     match geometry {
-        Geometry::Cartesian(_) => Joints::new(300.0 * u, 300.0 * v),
-        Geometry::Polar(_) => Joints::new(3.0 * u, 200.0 + 190.0 * v),
+        Geometry::Cartesian(_) => JointPos::new(300.0 * u, 300.0 * v),
+        Geometry::Polar(_) => JointPos::new(3.0 * u, 200.0 + 190.0 * v),
         Geometry::TwoLink(arm) => {
             let beta = (1.6 + 1.45 * v) * if arm.elbow_left { -1.0 } else { 1.0 };
-            Joints::new(3.0 * u, 3.0 * u + beta)
+            JointPos::new(3.0 * u, 3.0 * u + beta)
         }
     }
 }
@@ -75,9 +87,9 @@ proptest! {
     fn inverse_of_forward_is_the_pose(g in geometry(), u in -1.0..1.0f64, v in -1.0..1.0f64) {
         let q = pose(&g, u, v);
         let back = g.inverse(g.forward(&q)).unwrap();
-        let turns = g.turn().map_or(0.0, |turn| ((q.x - back.x) / turn.x).round());
-        let back = back + g.turn().unwrap_or_default() * turns;
-        prop_assert!((back - q).norm() < 1e-9, "{} against {}", back, q);
+        let turns = g.full_rotation().map_or(0.0, |turn| ((q[0] - back[0]) / turn[0]).round());
+        let back = back + g.full_rotation().unwrap_or_default() * turns;
+        prop_assert!((back - q).norm() < 1e-9, "{:?} against {:?}", back, q);
     }
 
     #[test]
@@ -85,11 +97,10 @@ proptest! {
         let (q, h) = (pose(&g, u, v), 1e-6);
         let jacobian = g.jacobian(&q);
         for joint in 0..2 {
-            let mut step = Joints::zeros();
+            let mut step = JointPos::ZERO;
             step[joint] = h;
             let difference = (g.forward(&(q + step)) - g.forward(&(q - step))) / (2.0 * h);
-            let column = jacobian.column(joint);
-            prop_assert!(libm::hypot(difference.x - column[0], difference.y - column[1]) < 1e-5);
+            prop_assert!((difference - jacobian[joint]).hypot2().sqrt() < 1e-5);
         }
     }
 
@@ -105,7 +116,7 @@ proptest! {
         let h = 1e-3;
         let at = |s: f64| {
             let back = g.inverse(p + s * first + 0.5 * s * s * second).unwrap();
-            back + g.turn().unwrap_or_default() * g.turn().map_or(0.0, |turn| ((q.x - back.x) / turn.x).round())
+            back + g.full_rotation().unwrap_or_default() * g.full_rotation().map_or(0.0, |turn| ((q[0] - back[0]) / turn[0]).round())
         };
         let (ahead, behind) = (at(h), at(-h));
         let (q_1, q_2) = g.path_derivatives(&q, first, second);
@@ -131,7 +142,7 @@ proptest! {
         };
         let difference = (second_at(h) - second_at(-h)) / (2.0 * h);
         let q_3 = g.path_third_derivative(&q, first, second, third);
-        prop_assert!((difference - q_3).norm() < 1e-4 * (1e-4 + q_3.norm()), "{} {}", difference, q_3);
+        prop_assert!((difference - q_3).norm() < 1e-4 * (1e-4 + q_3.norm()), "{:?} {:?}", difference, q_3);
     }
 
     /// |f(u) - chord(u)| <= u (1 - u) / 2 * max |f''|: linear joint motion stays within bend / 8 of the chord.
@@ -142,7 +153,7 @@ proptest! {
         let from = pose(&g, u, v);
         let to = pose(&g, (u + du).clamp(-1.0, 1.0), (v + dv).clamp(-1.0, 1.0));
         let (p, r) = (g.forward(&from), g.forward(&to));
-        let bound = g.bend(&from, &to);
+        let bound = g.second_derivative_bound(&from, &to);
         for k in 0..=20 {
             let t = f64::from(k) / 20.0;
             let off = g.forward(&(from + t * (to - from))) - (p + t * (r - p));
@@ -157,16 +168,16 @@ proptest! {
     ) {
         let m = machine(g, rows, [a, b], pose(&g, 0.0, 0.0));
         let q = pose(&g, u, v);
-        prop_assert!((m.joints(&m.ticks(&q)) - q).norm() < 1e-8);
-        let by_hand = a * (rows[0][0] * q.x + rows[0][1] * q.y) + 3.0;
-        prop_assert!((m.ticks(&q).x - by_hand).abs() < 1e-8 * (1.0 + by_hand.abs()));
+        prop_assert!((m.joint_positions(&m.motor_positions(&q)) - q).norm() < 1e-8);
+        let by_hand = a * (rows[0][0] * q[0] + rows[0][1] * q[1]) + 3.0;
+        prop_assert!((m.motor_positions(&q)[0] - by_hand).abs() < 1e-8 * (1.0 + by_hand.abs()));
     }
 
     #[test]
     fn poses_are_unwrapped_to_the_nearest_turn(g in geometry(), u in -1.0..1.0f64, v in -1.0..1.0f64, turns in -3..=3i32) {
         let m = machine(g, [[1.0, 0.0], [0.0, 1.0]], [10.0, 10.0], pose(&g, 0.0, 0.0));
         let q = pose(&g, u, v);
-        let near = q + g.turn().unwrap_or_default() * f64::from(turns);
+        let near = q + g.full_rotation().unwrap_or_default() * f64::from(turns);
         let found = m.pose_near(g.forward(&q), &near).unwrap();
         prop_assert!((found - near).norm() < 1e-8);
     }
@@ -212,7 +223,7 @@ fn the_elbow_is_on_the_side_that_was_asked_for() {
         let arm = Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left });
         let p = Point::new(120.0, 250.0);
         let q = arm.inverse(p).unwrap();
-        let elbow = 206.0 * Vec2::new(libm::cos(q.x), libm::sin(q.x));
+        let elbow = 206.0 * Vec2::new(libm::cos(q[0]), libm::sin(q[0]));
         // Left of the ray from base to pen: positive cross product.
         assert_eq!(p.to_vec2().cross(elbow) > 0.0, elbow_left);
     }
@@ -228,7 +239,7 @@ fn a_singular_coupling_is_refused() {
 #[test]
 fn a_start_pose_outside_the_joint_limits_is_refused() {
     let mut parts =
-        machine(Geometry::Polar(Polar), [[1.0, 0.0], [0.0, 1.0]], [10.0, 10.0], Joints::new(1.0, 50.0))
+        machine(Geometry::Polar(Polar), [[1.0, 0.0], [0.0, 1.0]], [10.0, 10.0], JointPos::new(1.0, 50.0))
             .parts()
             .clone();
     parts.joints[1] = Joint { min: 60.0, max: 100.0 };
@@ -242,6 +253,8 @@ fn the_tick_floor_of_the_first_seeds_arm() {
     let counts = 3200.0 / std::f64::consts::TAU;
     let m = machine(arm, [[1.0, 0.0], [0.0, -1.0]], [counts, counts], pose(&arm, 0.0, 0.0));
     let half = std::f64::consts::FRAC_PI_2;
-    assert!((m.tick_floor(&Joints::new(half, half)) - 0.4536).abs() < 1e-4);
-    assert!((m.tick_floor(&Joints::new(half, 0.0)) - libm::hypot(0.4045, 0.5027) / 2.0).abs() < 1e-3);
+    assert!((m.quantization_error(&JointPos::new(half, half)) - 0.4536).abs() < 1e-4);
+    assert!(
+        (m.quantization_error(&JointPos::new(half, 0.0)) - libm::hypot(0.4045, 0.5027) / 2.0).abs() < 1e-3
+    );
 }

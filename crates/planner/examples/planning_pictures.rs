@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
-use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, TwoLink};
+use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::lift::{Cell, Course};
 use planner::path::{Budget, Corner, Section, sections};
 use planner::time_law::{SpeedCap, profile};
@@ -142,7 +142,7 @@ fn speed() -> Result<String, Failure> {
     stroke.arc(EllipticArc::circular(Point::new(62.0, 53.5), 2.5, down, std::f64::consts::PI));
     let budget =
         Budget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: Corner::Parabola, row: f64::INFINITY };
-    let cap = SpeedCap { pen: machine.pen().max_speed, row_deviation: f64::INFINITY, period: 1e-3 };
+    let cap = SpeedCap { pen: machine.pen().max_speed_mm_s, row_deviation: f64::INFINITY, period: 1e-3 };
     let (mut limit, mut driven) = (Vec::new(), Vec::new());
     let mut way = 0.0;
     for section in sections(&stroke, &budget) {
@@ -195,9 +195,9 @@ fn pen_speed(section: &Section, piece: usize, s: f64) -> f64 {
 fn most(machine: &Machine, cell: &Cell, sample: usize) -> f64 {
     let [a, b] = machine.motors();
     let (first, second) = (cell.first[sample], cell.second[sample]);
-    let speed = (a.max_speed / first.x.abs()).min(b.max_speed / first.y.abs());
-    let room = a.max_acceleration * first.y.abs() + b.max_acceleration * first.x.abs();
-    speed.min((room / (first.x * second.y - first.y * second.x).abs()).sqrt())
+    let speed = (a.max_speed_ticks_s / first[0].abs()).min(b.max_speed_ticks_s / first[1].abs());
+    let room = a.max_acceleration_ticks_s2 * first[1].abs() + b.max_acceleration_ticks_s2 * first[0].abs();
+    speed.min((room / (first[0] * second[1] - first[1] * second[0]).abs()).sqrt())
 }
 
 /// Speed against acceleration of both motors of an arm, row by row.
@@ -222,9 +222,9 @@ fn phase() -> Result<String, Failure> {
     for (k, (motor, color)) in machine.motors().iter().zip([LINE, OTHER]).enumerate() {
         let mut dots = String::new();
         for w in rows.windows(3) {
-            let speed = (w[2][k] - w[0][k]) / (2.0 * period) / motor.max_speed;
+            let speed = (w[2][k] - w[0][k]) / (2.0 * period) / motor.max_speed_ticks_s;
             let acceleration =
-                (w[2][k] - 2.0 * w[1][k] + w[0][k]) / (period * period) / motor.max_acceleration;
+                (w[2][k] - 2.0 * w[1][k] + w[0][k]) / (period * period) / motor.max_acceleration_ticks_s2;
             let (x, y) = picture.at(speed, acceleration);
             let _ = write!(dots, "M{x:.1} {y:.1}h0");
         }
@@ -247,7 +247,14 @@ fn polyline(points: &[Point]) -> Stroke {
 
 fn motor(name: &str, counts: f64, offset: f64, speed: f64, acceleration: f64) -> Motor {
     let (max_speed, max_acceleration) = (counts * speed, counts * acceleration);
-    Motor { name: name.into(), counts, offset, max_speed, max_acceleration, max_jerk: None }
+    Motor {
+        name: name.into(),
+        ticks_per_unit: counts,
+        offset_ticks: offset,
+        max_speed_ticks_s: max_speed,
+        max_acceleration_ticks_s2: max_acceleration,
+        max_jerk_ticks_s3: None,
+    }
 }
 
 /// A CoreXY of 80 ticks/mm, belts of 141.42 mm/s and 1414.2 mm/s².
@@ -257,13 +264,18 @@ fn corexy() -> Result<Machine, Failure> {
         name: "CoreXY".into(),
         geometry: Geometry::Cartesian(Cartesian),
         joints: [joint; 2],
-        min_dexterity: 0.0,
+        min_manipulability: 0.0,
         coupling: [[1.0, 1.0], [1.0, -1.0]],
         motors: ["a", "b"].map(|name| motor(name, 80.0, 0.0, 141.42, 1414.2)),
-        pen: PenLift { max_speed: 1000.0, max_travel_speed: f64::INFINITY, lift_time: 0.1, drop_time: 0.1 },
+        pen: PenLimits {
+            max_speed_mm_s: 1000.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.1,
+            drop_time_s: 0.1,
+        },
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
-        start: Joints::zeros(),
-        period: 0.01,
+        start: JointPos::ZERO,
+        period_s: 0.01,
     })?)
 }
 
@@ -274,12 +286,17 @@ fn arm() -> Result<Machine, Failure> {
         name: "arm".into(),
         geometry: Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
         joints: [Joint::FREE; 2],
-        min_dexterity: 0.1,
+        min_manipulability: 0.1,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: ["arm1", "arm2"].map(|name| motor(name, counts, 0.0, 1.0, 5.0)),
-        pen: PenLift { max_speed: 1000.0, max_travel_speed: f64::INFINITY, lift_time: 0.1, drop_time: 0.1 },
+        pen: PenLimits {
+            max_speed_mm_s: 1000.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.1,
+            drop_time_s: 0.1,
+        },
         sheet: Rect::new(12.7, 76.2, 228.6, 355.6),
-        start: Joints::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
-        period: 0.01,
+        start: JointPos::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
+        period_s: 0.01,
     })?)
 }

@@ -1,8 +1,7 @@
 //! Lifting the pen's path into joint space, adaptively, with what a time law must know.
 
 use drawing::{Point, Segment, Vec2};
-use kinematics::{Fault, Geometry, Joints, Machine, OutOfReach};
-use nalgebra::Vector2;
+use kinematics::{Fault, Geometry, JointPos, Machine, MotorPos, OutOfReach};
 
 use crate::path::{Piece, Section};
 
@@ -22,9 +21,9 @@ pub struct JointPath {
 #[derive(Clone, Debug)]
 pub enum Course {
     /// The pen follows these pieces, beginning in this pose.
-    Drawn(Joints, Section),
+    Drawn(JointPos, Section),
     /// The joints go straight from one pose to the other; the pen is up.
-    Travel(Joints, Joints),
+    Travel(JointPos, JointPos),
 }
 
 /// A stretch of a joint path between two nodes.
@@ -38,9 +37,9 @@ pub struct Cell {
     pub start: f64,
     /// The motors' derivatives by `s` at its start, middle and end, ticks per unit. The two sides of a node differ where
     /// pieces meet, so each cell has its own.
-    pub first: [Vector2<f64>; 3],
+    pub first: [MotorPos; 3],
     /// Second derivatives, likewise.
-    pub second: [Vector2<f64>; 3],
+    pub second: [MotorPos; 3],
     /// Largest |dp/ds| of the pen.
     pub pen_speed: f64,
     /// Bound on how much the pen's path bends against linear joint motion, for a unit of (ds/dt)², 1/mm: rows `T` apart
@@ -66,9 +65,9 @@ const SHORTEST: f64 = 1e-5;
 #[derive(Clone, Copy)]
 pub(crate) struct Rates {
     /// Of the motors.
-    pub(crate) first: Vector2<f64>,
+    pub(crate) first: MotorPos,
     /// Likewise.
-    pub(crate) second: Vector2<f64>,
+    pub(crate) second: MotorPos,
     /// See [`Cell::pen_speed`].
     pub(crate) pen_speed: f64,
     /// Curvature times speed², 1/mm.
@@ -83,23 +82,23 @@ struct Sample {
     /// Position on the piece, in `s`.
     s: f64,
     point: Point,
-    pose: Joints,
+    pose: JointPos,
     rates: Rates,
 }
 
 impl JointPath {
     /// The straight way in joint space, along which all motors start and stop together. Nothing if there is no way to go.
-    pub fn travel(machine: &Machine, from: Joints, to: Joints) -> Option<Self> {
+    pub fn travel(machine: &Machine, from: JointPos, to: JointPos) -> Option<Self> {
         let change = machine.motor_rates(&(to - from));
         let pen_speed = travel_speed(machine, from, to);
-        (change.amax() > 0.0).then(|| Self {
+        (change.max_abs() > 0.0).then(|| Self {
             course: Course::Travel(from, to),
             cells: vec![Cell {
                 length: 1.0,
                 piece: 0,
                 start: 0.0,
                 first: [change; 3],
-                second: [Vector2::zeros(); 3],
+                second: [MotorPos::ZERO; 3],
                 pen_speed,
                 bend: 0.0,
                 near_turn: false,
@@ -120,7 +119,7 @@ impl JointPath {
     pub fn lift(
         machine: &Machine,
         section: Section,
-        pose: Joints,
+        pose: JointPos,
         tolerance: f64,
     ) -> Result<Self, OutOfReach> {
         let mut lifter = Lifter { machine, tolerance, cells: Vec::with_capacity(section.len()) };
@@ -183,19 +182,19 @@ impl Cell {
 
     /// Whether the motors move in proportion to the parameter, so that any even acceleration on it is even in the motors.
     pub(crate) fn is_straight(&self) -> bool {
-        self.second.iter().all(|second| *second == Vector2::zeros())
+        self.second.iter().all(|second| *second == MotorPos::ZERO)
     }
 }
 
 impl Course {
     /// The joints at `s` on a piece, exactly on the path; angles are unwrapped to the turn nearest to `near`.
-    pub fn pose(&self, machine: &Machine, piece: usize, s: f64, near: &Joints) -> Joints {
+    pub fn pose(&self, machine: &Machine, piece: usize, s: f64, near: &JointPos) -> JointPos {
         match self {
             Self::Travel(from, to) => {
                 if s >= 1.0 {
                     *to
                 } else {
-                    from + s * (to - from)
+                    *from + s * (*to - *from)
                 }
             }
             Self::Drawn(_, pieces) => {
@@ -208,7 +207,7 @@ impl Course {
     }
 
     /// The joints at the start.
-    pub fn start(&self) -> Joints {
+    pub fn start(&self) -> JointPos {
         match self {
             Self::Travel(from, _) => *from,
             Self::Drawn(pose, _) => *pose,
@@ -239,7 +238,7 @@ fn first_cells(piece: &Piece) -> usize {
 
 impl Lifter<'_> {
     /// Lifts one piece and gives the pose at its end.
-    fn piece(&mut self, index: usize, piece: &Piece, near: Joints) -> Result<Joints, OutOfReach> {
+    fn piece(&mut self, index: usize, piece: &Piece, near: JointPos) -> Result<JointPos, OutOfReach> {
         let parts = first_cells(piece);
         let length = piece.length();
         let mut from = self.sample(piece, 0.0, near)?;
@@ -268,8 +267,11 @@ impl Lifter<'_> {
             }
             // Only at a singular pose can a joint still jump over so short a way.
             if self.turned(&a, &b) > 1.0 {
-                let min = self.machine.parts().min_dexterity;
-                return Err(OutOfReach { point: b.point, fault: Fault::Singular { dexterity: 0.0, min } });
+                let min = self.machine.parts().min_manipulability;
+                return Err(OutOfReach {
+                    point: b.point,
+                    fault: Fault::Singular { manipulability: 0.0, min },
+                });
             }
             let samples = [&a.rates, &middle.rates, &b.rates];
             let most = |of: fn(&Rates) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
@@ -315,11 +317,13 @@ impl Lifter<'_> {
     /// Whether the cell is short enough for linear joint motion.
     fn is_near(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
         let turning = a.rates.turning.max(middle.rates.turning).max(b.rates.turning);
-        let deviation = (self.machine.geometry().bend(&a.pose, &b.pose) + length * length * turning) / 8.0;
+        let deviation = (self.machine.geometry().second_derivative_bound(&a.pose, &b.pose)
+            + length * length * turning)
+            / 8.0;
         self.turned(a, b) <= LARGEST_TURN && deviation <= self.tolerance
     }
 
-    fn sample(&self, piece: &Piece, s: f64, near: Joints) -> Result<Sample, OutOfReach> {
+    fn sample(&self, piece: &Piece, s: f64, near: JointPos) -> Result<Sample, OutOfReach> {
         let t = s * piece.rate;
         let point = piece.curve.eval(t);
         let out = |fault| OutOfReach { point, fault };
@@ -336,32 +340,29 @@ impl Lifter<'_> {
 ///
 /// The way in `n` parts: `|dp/ds|` changes by `B` at the most over all of it, so by `B / n` between a part's ends, where B
 /// bounds the second derivative.
-pub(crate) fn travel_speed(machine: &Machine, from: Joints, to: Joints) -> f64 {
+pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f64 {
     const PARTS: u32 = 16;
-    if machine.pen().max_travel_speed == f64::INFINITY {
+    if machine.pen().max_travel_speed_mm_s == f64::INFINITY {
         return 0.0;
     }
     let geometry = machine.geometry();
     let change = to - from;
-    let speed =
-        |k: u32| (geometry.jacobian(&(from + f64::from(k) / f64::from(PARTS) * change)) * change).norm();
+    let speed = |k: u32| {
+        let pose = from + f64::from(k) / f64::from(PARTS) * change;
+        geometry.pen_velocity(&pose, &change).hypot2().sqrt()
+    };
     let fastest = (0..=PARTS).map(speed).fold(0.0, f64::max);
-    fastest + 0.5 * geometry.bend(&from, &to) / f64::from(PARTS)
+    fastest + 0.5 * geometry.second_derivative_bound(&from, &to) / f64::from(PARTS)
 }
 
 /// First and second derivatives of the motors by `s`, at a piece's own parameter `t`, where the pose is `pose`.
-fn motor_derivatives(
-    machine: &Machine,
-    piece: &Piece,
-    t: f64,
-    pose: &Joints,
-) -> (Vector2<f64>, Vector2<f64>) {
+fn motor_derivatives(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> (MotorPos, MotorPos) {
     let (velocity, acceleration) = piece.curve.derivatives(t);
     machine.motor_derivatives(pose, piece.rate * velocity, piece.rate * piece.rate * acceleration)
 }
 
 /// Third derivatives, likewise.
-pub(crate) fn third_derivative(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Vector2<f64> {
+pub(crate) fn third_derivative(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> MotorPos {
     let rate = piece.rate;
     let (first, second) = piece.curve.derivatives(t);
     let third = rate * rate * rate * piece.curve.third_derivative(t);
@@ -370,7 +371,7 @@ pub(crate) fn third_derivative(machine: &Machine, piece: &Piece, t: f64, pose: &
 
 impl Rates {
     /// At the curve's own parameter `t`, where the pose is `pose`.
-    pub(crate) fn of(machine: &Machine, piece: &Piece, t: f64, pose: &Joints) -> Self {
+    pub(crate) fn of(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> Self {
         let (velocity, acceleration) = piece.curve.derivatives(t);
         let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let pen_speed = velocity.hypot2().sqrt();
@@ -381,28 +382,28 @@ impl Rates {
         // Along a straight line an uneven parameter bends nothing; on a turn all of p'' may.
         let bending =
             if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
-        let bend = bending + geometry.bend(pose, &(pose + rates));
+        let bend = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
         Self { first, second, pen_speed, turning, bend }
     }
 }
 
 /// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
 /// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
-fn bulge(machine: &Machine, pen_speed: f64, first: &[Vector2<f64>; 3], second: &[Vector2<f64>; 3]) -> f64 {
+fn bulge(machine: &Machine, pen_speed: f64, first: &[MotorPos; 3], second: &[MotorPos; 3]) -> f64 {
     let off = |x: [f64; 3]| (x[1] - 0.5 * (x[0] + x[2])).abs();
     let most = |x: [f64; 3]| x[0].abs().max(x[1].abs()).max(x[2].abs());
     let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);
     let (mut turning, mut turning_off) = (0.0_f64, 0.0_f64);
     for (k, motor) in machine.motors().iter().enumerate() {
-        let rates = first.map(|first| first[k] / motor.max_speed);
-        let turns = second.map(|second| second[k] / motor.max_acceleration);
+        let rates = first.map(|first| first[k] / motor.max_speed_ticks_s);
+        let turns = second.map(|second| second[k] / motor.max_acceleration_ticks_s2);
         (slowness, slowness_off) = (slowness.max(most(rates)), slowness_off.max(off(rates)));
         (turning, turning_off) = (turning.max(most(turns)), turning_off.max(off(turns)));
     }
     if slowness == 0.0 {
         return 0.0;
     }
-    let fastest = (machine.pen().max_speed / pen_speed).min(1.0 / slowness);
+    let fastest = (machine.pen().max_speed_mm_s / pen_speed).min(1.0 / slowness);
     let square_speed = (fastest * fastest).min(1.0 / turning);
     slowness_off / slowness + turning_off * square_speed
 }

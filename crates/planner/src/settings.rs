@@ -1,8 +1,7 @@
 //! How a plan is to be made, and how its tolerance is shared out.
 
 use drawing::{Pen, Point};
-use kinematics::{Joints, Machine};
-use nalgebra::Vector2;
+use kinematics::{JointPos, Machine, MotorPos};
 
 use crate::{
     PlanError,
@@ -18,7 +17,7 @@ pub struct Settings {
     /// Time between rows, microseconds.
     pub period_us: u64,
     /// Where the plan ends, pen up and at rest; the machine's start pose if nothing is said.
-    pub park: Option<Joints>,
+    pub park: Option<JointPos>,
     /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
     pub pen_speeds: Vec<(Pen, f64)>,
     /// For how much of the time that a lift takes the motors may already travel, s.
@@ -60,7 +59,7 @@ impl Settings {
     /// How fast a pen may go over the paper, mm/s.
     pub(crate) fn speed_of(&self, machine: &Machine, pen: Pen) -> f64 {
         let own = self.pen_speeds.iter().filter(|(which, _)| *which == pen).map(|(_, speed)| *speed);
-        own.fold(machine.pen().max_speed, f64::min)
+        own.fold(machine.pen().max_speed_mm_s, f64::min)
     }
 }
 
@@ -95,11 +94,12 @@ impl Shares {
             Point::new(sheet.x1, sheet.y1),
             Point::new(sheet.x0, sheet.y1),
         ];
-        let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration);
-        let pen_acceleration = |pose: &Joints| {
-            let jacobian = machine.geometry().jacobian(pose);
-            let of = |rates: Vector2<f64>| (jacobian * machine.joint_rates(&rates)).norm();
-            of(Vector2::new(a, b)).max(of(Vector2::new(a, -b)))
+        let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration_ticks_s2);
+        let pen_acceleration = |pose: &JointPos| {
+            let of = |rates: MotorPos| {
+                machine.geometry().pen_velocity(pose, &machine.joint_rates(&rates)).hypot2().sqrt()
+            };
+            of(MotorPos::new(a, b)).max(of(MotorPos::new(a, -b)))
         };
         let poses = places.iter().filter_map(|place| machine.pose_near(*place, &machine.start()).ok());
         let acceleration = poses.map(|pose| pen_acceleration(&pose)).fold(0.0, f64::max);
@@ -109,7 +109,7 @@ impl Shares {
         let path = tolerance - row;
         let simplify = SIMPLIFY_SHARE * path;
         let marked = if needed > share { row } else { f64::INFINITY };
-        let jerk = machine.motors().iter().any(|motor| motor.max_jerk.is_some());
+        let jerk = machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some());
         let corner = if jerk { Corner::Spline } else { Corner::Parabola };
         Self {
             row,

@@ -1,7 +1,7 @@
 //! One stroke: where the machine can draw it, and how it moves along it.
 
 use drawing::{Point, Stroke};
-use kinematics::{Joints, Machine, OutOfReach, Unreachable};
+use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
     Settings,
@@ -18,20 +18,20 @@ pub(crate) struct Move {
     pub(crate) course: Course,
     pub(crate) profile: Profile,
     /// The pose at its end.
-    pub(crate) end: Joints,
+    pub(crate) end: JointPos,
     pub(crate) periods: u64,
 }
 
 /// A stroke as drawn from one of its poses.
 #[derive(Clone, Debug)]
 pub(crate) struct Drawn {
-    pub(crate) start: Joints,
+    pub(crate) start: JointPos,
     /// None for a dot.
     pub(crate) moves: Vec<Move>,
 }
 
 impl Drawn {
-    pub(crate) fn end(&self) -> Joints {
+    pub(crate) fn end(&self) -> JointPos {
         self.moves.last().map_or(self.start, |last| last.end)
     }
 }
@@ -50,7 +50,7 @@ impl StrokePlanner<'_> {
     pub(crate) fn draw(
         &self,
         stroke: &Stroke,
-        near: &Joints,
+        near: &JointPos,
         ready: Option<Result<Drawn, OutOfReach>>,
     ) -> Result<Drawn, OutOfReach> {
         let start = stroke.start();
@@ -68,12 +68,13 @@ impl StrokePlanner<'_> {
                 Err(error) => first_error = first_error.or(Some(error)),
             }
         }
-        let fault = kinematics::Fault::Singular { dexterity: 0.0, min: self.machine.parts().min_dexterity };
+        let fault =
+            kinematics::Fault::Singular { manipulability: 0.0, min: self.machine.parts().min_manipulability };
         Err(first_error.unwrap_or(OutOfReach { point: start, fault }))
     }
 
     /// The pose near `near` in which a stroke would most likely begin, and one in which it would end.
-    pub(crate) fn guess(&self, stroke: &Stroke, near: &Joints) -> Option<(Joints, Joints)> {
+    pub(crate) fn guess(&self, stroke: &Stroke, near: &JointPos) -> Option<(JointPos, JointPos)> {
         let pose = *self.machine.poses(stroke.start(), near).ok()?.first()?;
         let mut end = pose;
         for vertex in stroke.vertices().iter() {
@@ -86,7 +87,7 @@ impl StrokePlanner<'_> {
     ///
     /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
     /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
-    pub(crate) fn draw_from(&self, stroke: &Stroke, pose: Joints) -> Result<Drawn, OutOfReach> {
+    pub(crate) fn draw_from(&self, stroke: &Stroke, pose: JointPos) -> Result<Drawn, OutOfReach> {
         let exact = Budget { simplify: 0.0, blend: 0.0, ..self.shares.path };
         match self.settings.law {
             Law::TimeOptimal => {
@@ -98,7 +99,7 @@ impl StrokePlanner<'_> {
         }
     }
 
-    fn follow(&self, stroke: &Stroke, start: Joints, sections: Vec<Section>) -> Result<Drawn, OutOfReach> {
+    fn follow(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<Drawn, OutOfReach> {
         let mut drawn = Drawn { start, moves: Vec::with_capacity(sections.len()) };
         let speed = self.settings.speed_of(self.machine, stroke.pen);
         for section in sections {
@@ -111,7 +112,7 @@ impl StrokePlanner<'_> {
     }
 
     /// The pose at the end of a drawn path, unwrapped along its cells.
-    fn end_pose(&self, path: &JointPath, end: Point) -> Result<Joints, OutOfReach> {
+    fn end_pose(&self, path: &JointPath, end: Point) -> Result<JointPos, OutOfReach> {
         let along = path.cells.iter().fold(path.course.start(), |near, cell| {
             path.course.pose(self.machine, cell.piece, cell.start, &near)
         });
@@ -120,7 +121,7 @@ impl StrokePlanner<'_> {
     }
 
     /// Lays the time law upon a path.
-    fn movement(&self, path: JointPath, end: Joints, pen: f64) -> Move {
+    fn movement(&self, path: JointPath, end: JointPos, pen: f64) -> Move {
         let period = self.period();
         if let (Law::Eased { ease, segment_time }, Course::Drawn(_, section)) =
             (self.settings.law, &path.course)
@@ -137,9 +138,9 @@ impl StrokePlanner<'_> {
     }
 
     /// The way with the pen up from pose to pose; nothing where there is none.
-    pub(crate) fn travel(&self, from: Joints, to: Joints) -> Option<Move> {
+    pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Option<Move> {
         let path = JointPath::travel(self.machine, from, to)?;
-        Some(self.movement(path, to, self.machine.pen().max_travel_speed))
+        Some(self.movement(path, to, self.machine.pen().max_travel_speed_mm_s))
     }
 
     /// Time between rows, s.

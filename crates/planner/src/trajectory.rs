@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 
 use drawing::{Drawing, Stroke};
-use kinematics::{Joints, Machine, OutOfReach};
+use kinematics::{JointPos, Machine, OutOfReach};
 use plan::Row;
 use rayon::prelude::*;
 
@@ -227,9 +227,9 @@ struct Legs<'a> {
     /// What was planned of the strokes from `next` on.
     batch: VecDeque<Option<Result<Drawn, OutOfReach>>>,
     /// Where the machine will be when the batch is drawn, as far as one knows.
-    guess: Joints,
+    guess: JointPos,
     /// Where it is after all legs so far.
-    here: Joints,
+    here: JointPos,
     queue: VecDeque<Leg>,
     /// Whether the pen has still to be lifted after all legs so far.
     is_down: bool,
@@ -275,7 +275,7 @@ impl Legs<'_> {
         let pen = self.planner.machine.pen();
         // A dot is nothing but its dwell: without any there would be no ink in the plan.
         let dwell =
-            whole_periods(pen.drop_time, self.planner.period()).max(u64::from(drawn.moves.is_empty()));
+            whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(drawn.moves.is_empty()));
         self.queue.push_back(Leg::Pen { pen: stroke.pen.0, periods: dwell });
         self.here = drawn.end();
         self.queue.extend(drawn.moves.into_iter().map(Leg::Move));
@@ -285,10 +285,10 @@ impl Legs<'_> {
 
     /// Lifts the pen if it is down, and travels. Of the lift's time so much may be travelled as the settings allow, where
     /// the way takes as long: the lift ends before the next drop begins.
-    fn travel(&mut self, to: Joints) {
+    fn travel(&mut self, to: JointPos) {
         let way = self.planner.travel(self.here, to);
         if std::mem::take(&mut self.is_down) {
-            let whole = whole_periods(self.planner.machine.pen().lift_time, self.planner.period());
+            let whole = whole_periods(self.planner.machine.pen().lift_time_s, self.planner.period());
             let overlap = (self.planner.settings.lift_overlap / self.planner.period() + 1e-9).floor() as u64;
             let overlap = overlap.min(way.as_ref().map_or(0, |way| way.periods));
             self.queue.push_back(Leg::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
@@ -313,8 +313,9 @@ impl Legs<'_> {
             }
         }
         let planner = self.planner;
-        let plan =
-            |(stroke, start): (&Stroke, Option<Joints>)| start.map(|start| planner.draw_from(stroke, start));
+        let plan = |(stroke, start): (&Stroke, Option<JointPos>)| {
+            start.map(|start| planner.draw_from(stroke, start))
+        };
         self.batch = starts.into_par_iter().map(plan).collect::<Vec<_>>().into();
     }
 }
@@ -348,7 +349,7 @@ pub struct Rows<'a> {
     t_us: u64,
     pen: u16,
     /// Where the joints are.
-    pose: Joints,
+    pose: JointPos,
     finished: bool,
 }
 
@@ -404,7 +405,7 @@ struct Cursor {
 
 impl Cursor {
     /// The pose now; `near` is the one before.
-    fn pose(&mut self, machine: &Machine, movement: &Move, near: &Joints) -> Joints {
+    fn pose(&mut self, machine: &Machine, movement: &Move, near: &JointPos) -> JointPos {
         let Move { course, profile, periods, .. } = movement;
         // The profile is stretched to a whole number of periods, which only slows it down.
         let time = profile.duration * (self.period as f64 / *periods as f64);
@@ -423,9 +424,9 @@ impl Cursor {
 
 impl Rows<'_> {
     fn emit(&self) -> ExactRow {
-        let exact = self.machine.ticks(&self.pose);
-        let ticks = [exact.x.round() as i64, exact.y.round() as i64];
-        ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks }, exact: [exact.x, exact.y] }
+        let exact = self.machine.motor_positions(&self.pose);
+        let ticks = [exact[0].round() as i64, exact[1].round() as i64];
+        ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks }, exact: [exact[0], exact[1]] }
     }
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unreadable_literal, reason = "inputs as a failing property gave them")]
 
 use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
-use kinematics::{Joints, Machine};
+use kinematics::{JointPos, Machine, MotorPos};
 use planner::placement::{Size, Wish, place};
 use planner::{Ease, ExactRow, Law, PlanError, Settings, plan};
 use proptest::prelude::*;
@@ -117,8 +117,8 @@ fn stays_within(
     let period = period_us as f64 * 1e-6;
 
     let (first, last) = (rows.first().expect("rows").row, rows.last().expect("rows").row);
-    let start = machine.ticks(&machine.start());
-    prop_assert_eq!(first.ticks, [start.x.round() as i64, start.y.round() as i64]);
+    let start = machine.motor_positions(&machine.start());
+    prop_assert_eq!(first.ticks, [start[0].round() as i64, start[1].round() as i64]);
     prop_assert_eq!(last.ticks, first.ticks);
     prop_assert_eq!((first.t_us, first.pen, last.pen), (0, 0, 0));
     prop_assert_eq!(last.t_us, trajectory.duration_us());
@@ -127,28 +127,28 @@ fn stays_within(
 
     let all = filled(&rows, period_us);
     // Under jerk limits accelerations are held in places, and between them as far as samples show.
-    let slack = if machine.motors()[0].max_jerk.is_some() { 1e-4 } else { 1e-6 };
+    let slack = if machine.motors()[0].max_jerk_ticks_s3.is_some() { 1e-4 } else { 1e-6 };
     for (k, motor) in machine.motors().iter().enumerate() {
         for w in all.windows(3) {
             let speed = (w[1][k] - w[0][k]).abs() / period;
             let acceleration = (w[2][k] - 2.0 * w[1][k] + w[0][k]).abs() / (period * period);
             prop_assert!(
-                speed <= motor.max_speed * (1.0 + 1e-6) + 1e-6 / period,
+                speed <= motor.max_speed_ticks_s * (1.0 + 1e-6) + 1e-6 / period,
                 "speed {} of {}",
                 speed,
-                motor.max_speed
+                motor.max_speed_ticks_s
             );
             prop_assert!(
-                acceleration <= motor.max_acceleration * (1.0 + slack) + 1e-6 / (period * period),
+                acceleration <= motor.max_acceleration_ticks_s2 * (1.0 + slack) + 1e-6 / (period * period),
                 "acceleration {} of {}",
                 acceleration,
-                motor.max_acceleration
+                motor.max_acceleration_ticks_s2
             );
         }
     }
 
     for (k, motor) in machine.motors().iter().enumerate() {
-        let Some(limit) = motor.max_jerk else { continue };
+        let Some(limit) = motor.max_jerk_ticks_s3 else { continue };
         for w in all.windows(4) {
             let jerk = (w[3][k] - 3.0 * w[2][k] + 3.0 * w[1][k] - w[0][k]).abs() / (period * period * period);
             prop_assert!(
@@ -165,8 +165,8 @@ fn stays_within(
     let mut ink: Vec<Point> = Vec::new();
     for pair in rows.windows(2) {
         let at = |row: &ExactRow, other: &ExactRow, u: f64| {
-            let (a, b) = (Joints::from(row.exact), Joints::from(other.exact));
-            machine.pen_at(&(a + u * (b - a)))
+            let (a, b) = (MotorPos::from(row.exact), MotorPos::from(other.exact));
+            machine.forward_from_motors(&(a + u * (b - a)))
         };
         if pair[0].row.pen > 0 {
             ink.extend((0..=4).map(|k| at(&pair[0], &pair[1], f64::from(k) / 4.0)));
@@ -218,7 +218,7 @@ fn line(points: &[(f64, f64)]) -> Drawing {
 fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
     let machine = machines::corexy();
     let mut parts = machine.parts().clone();
-    parts.pen.max_speed = 1e9;
+    parts.pen.max_speed_mm_s = 1e9;
     let machine = Machine::new(parts).unwrap();
     // Along x both motors turn by 92 ticks/mm: v = 4000/92 mm/s, a = 30000/92 mm/s², T = d/v + v/a.
     let trajectory = plan(&machine, line(&[(10.0, 10.0), (110.0, 10.0)]), &settings()).unwrap();
@@ -302,7 +302,7 @@ fn a_sharp_corner_at_a_long_period_is_not_cut() {
     let rows: Vec<ExactRow> = trajectory.rows().collect();
     let drawn =
         rows.windows(2).filter(|pair| pair[0].row.pen > 0).flat_map(|pair| [pair[0].exact, pair[1].exact]);
-    let ink: Vec<Point> = drawn.map(|exact| machine.pen_at(&Joints::from(exact))).collect();
+    let ink: Vec<Point> = drawn.map(|exact| machine.forward_from_motors(&MotorPos::from(exact))).collect();
     for vertex in placed.strokes[0].vertices().iter() {
         assert!(to_polyline(*vertex, &ink) <= 0.1, "{vertex} is missed by {}", to_polyline(*vertex, &ink));
     }
@@ -379,7 +379,7 @@ fn laws_with_a_given_time_give_it_to_every_piece() {
             Ease::Linear | Ease::QuadraticInOut => 0.5,
         };
         let middle = trajectory.rows().nth(down + 1 + 25).unwrap();
-        let at = machine.pen_at(&Joints::from(middle.exact));
+        let at = machine.forward_from_motors(&MotorPos::from(middle.exact));
         assert!((at.x - (10.0 + 50.0 * share)).abs() < 1e-9, "{ease:?} at {at}");
     }
 }
@@ -389,8 +389,8 @@ fn a_trapezoid_rests_at_every_vertex() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0)]);
     let exact = plan(&machine, drawing.clone(), &Settings { law: Law::Trapezoid, ..settings() }).unwrap();
-    let corner = machine.ticks(&Joints::new(60.0, 10.0));
-    assert!(exact.rows().any(|row| row.exact == [corner.x, corner.y]));
+    let corner = machine.motor_positions(&JointPos::new(60.0, 10.0));
+    assert!(exact.rows().any(|row| row.exact == [corner[0], corner[1]]));
     assert!(exact.times().drawing > plan(&machine, drawing, &settings()).unwrap().times().drawing);
 }
 
@@ -399,13 +399,15 @@ fn travel_keeps_to_the_pens_travel_speed() {
     for plain in [machines::arm(), machines::polar(), machines::corexy()] {
         for machine in [plain.clone(), machines::with_jerk(&plain, 0.05)] {
             let mut parts = machine.parts().clone();
-            parts.pen.max_travel_speed = 20.0;
+            parts.pen.max_travel_speed_mm_s = 20.0;
             let slow = Machine::new(parts).unwrap();
             let drawing = line(&[(40.0, 100.0)]);
             let times = [&machine, &slow].map(|machine| {
                 let trajectory = plan(machine, drawing.clone(), &settings()).unwrap();
-                let points: Vec<Point> =
-                    trajectory.rows().map(|row| machine.pen_at(&Joints::from(row.exact))).collect();
+                let points: Vec<Point> = trajectory
+                    .rows()
+                    .map(|row| machine.forward_from_motors(&MotorPos::from(row.exact)))
+                    .collect();
                 let steps = points.windows(2).map(|w| (w[1] - w[0]).hypot2().sqrt());
                 (trajectory.times().travel, steps.fold(0.0, f64::max) / 0.01)
             });

@@ -16,8 +16,7 @@ use clarabel::solver::{
     SupportedConeT,
 };
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
-use kinematics::{Joints, Machine};
-use nalgebra::Vector2;
+use kinematics::{JointPos, Machine, MotorPos};
 use planner::JointPath;
 use planner::lift::Course;
 use planner::path::{Budget, Corner, Piece, sections};
@@ -39,9 +38,9 @@ const COARSE_EXCESS: f64 = 0.005;
 /// The path and the motors at one place, from one side.
 #[derive(Clone, Copy)]
 struct Place {
-    ticks: Vector2<f64>,
-    first: Vector2<f64>,
-    second: Vector2<f64>,
+    ticks: MotorPos,
+    first: MotorPos,
+    second: MotorPos,
     pen_speed: f64,
 }
 
@@ -51,16 +50,16 @@ struct Cell {
     /// At its start, middle and end.
     places: [Place; 3],
     /// ∫|m'| ds over it, ticks.
-    way: Vector2<f64>,
+    way: MotorPos,
 }
 
-fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut Joints) -> Place {
+fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut JointPos) -> Place {
     let t = (s * piece.rate).min(1.0);
     *near = machine.pose_near(piece.curve.eval(t), near).expect("it was lifted");
     let (velocity, acceleration) = piece.curve.derivatives(t);
     let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
     let (first, second) = machine.motor_derivatives(near, velocity, acceleration);
-    Place { ticks: machine.ticks(near), first, second, pen_speed: velocity.hypot2().sqrt() }
+    Place { ticks: machine.motor_positions(near), first, second, pen_speed: velocity.hypot2().sqrt() }
 }
 
 /// Every cell of the path in `parts` parts, and none longer than the whole path's length by `50 parts`.
@@ -77,7 +76,7 @@ fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
             let from = cell.start + k as f64 * length;
             let mut at = |share: f64| place(machine, piece, from + share * length, &mut near);
             let places = [0.0, 0.5, 1.0].map(&mut at);
-            let way = Vector2::from_fn(|motor, _| {
+            let way = MotorPos([0, 1].map(|motor| {
                 let [start, _, end] = places;
                 if start.first[motor] * end.first[motor] >= 0.0 {
                     return (end.ticks[motor] - start.ticks[motor]).abs();
@@ -91,7 +90,7 @@ fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
                 }
                 let turn = at(low).ticks[motor];
                 (turn - start.ticks[motor]).abs() + (end.ticks[motor] - turn).abs()
-            });
+            }));
             grid.push(Cell { length, places, way });
         }
     }
@@ -101,16 +100,16 @@ fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
 /// The largest b at which the motors' and the pen's speeds hold.
 fn by_speed(machine: &Machine, place: &Place, pen: f64) -> f64 {
     let motors = machine.motors().iter().enumerate();
-    let speeds = motors.map(|(k, motor)| motor.max_speed / place.first[k].abs());
+    let speeds = motors.map(|(k, motor)| motor.max_speed_ticks_s / place.first[k].abs());
     let speed = speeds.fold(pen / place.pen_speed, f64::min);
     speed * speed
 }
 
 /// The largest b at which some u fulfils `|m' u + m'' b| <= a` for both motors.
 fn by_acceleration(machine: &Machine, place: &Place) -> f64 {
-    let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration);
+    let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration_ticks_s2);
     let (first, second) = (place.first, place.second);
-    (a * first.y.abs() + b * first.x.abs()) / (first.x * second.y - first.y * second.x).abs()
+    (a * first[1].abs() + b * first[0].abs()) / (first[0] * second[1] - first[1] * second[0]).abs()
 }
 
 /// A time that no motion along the path can be faster than, s.
@@ -125,7 +124,7 @@ fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     let reached = |cell: &Cell, from: &Place, to: &Place, b: f64| {
         let by = |k: usize| {
             let squared_speed =
-                from.first[k] * from.first[k] * b + 2.0 * motors[k].max_acceleration * cell.way[k];
+                from.first[k] * from.first[k] * b + 2.0 * motors[k].max_acceleration_ticks_s2 * cell.way[k];
             squared_speed / (to.first[k] * to.first[k])
         };
         by(0).min(by(1))
@@ -140,7 +139,7 @@ fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     }
     let time = |(k, cell): (usize, &Cell)| {
         let by = |motor: usize| {
-            let (v, a) = (motors[motor].max_speed, motors[motor].max_acceleration);
+            let (v, a) = (motors[motor].max_speed_ticks_s, motors[motor].max_acceleration_ticks_s2);
             let start = cell.places[0].first[motor].abs() * b[k].sqrt();
             let end = cell.places[2].first[motor].abs() * b[k + 1].sqrt();
             let way = cell.way[motor];
@@ -173,7 +172,7 @@ fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
                 let place = &cell.places[j];
                 let rate = place.first[motor] / (2.0 * cell.length);
                 let turn = place.second[motor];
-                let scale = unit / limits.max_acceleration;
+                let scale = unit / limits.max_acceleration_ticks_s2;
                 let (from, to) = (scale * ((1.0 - share) * turn - rate), scale * (share * turn + rate));
                 for sign in [1.0, -1.0] {
                     rows.push(&[(b(k), sign * from), (b(k + 1), sign * to)], 1.0);

@@ -98,7 +98,7 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
             page.pens.iter().filter_map(of).filter(|(_, speed)| *speed > 0.0).collect()
         }
     };
-    let period = planning.period.unwrap_or(machine.parts().period);
+    let period = planning.period.unwrap_or(machine.parts().period_s);
     Request {
         tolerance_mm: planning.tolerance,
         period_us: (period * 1e6).round().max(0.0) as u64,
@@ -106,7 +106,7 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
         wish: Wish { rotate: planning.rotate.unwrap_or(0.0).to_radians(), size },
         pen_speeds,
         // The pen is off the paper long before it is all the way up.
-        lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time } else { 0.0 },
+        lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
         law: law(planning),
         allow_over_limit: planning.allow_over_limit,
     }

@@ -11,7 +11,7 @@
 use std::time::Instant;
 
 use drawing::{Affine, Drawing, Pen, Point, Span, Stroke, Vec2};
-use kinematics::{Geometry, Joints, Machine, MachineParts, TwoLink};
+use kinematics::{Geometry, JointPos, Machine, MachineParts, TwoLink};
 use plan::Row;
 use verify::Verifier;
 
@@ -38,13 +38,13 @@ fn rows(machine: &Machine, drawing: &Drawing, step: f64, period_us: u64) -> Vec<
     let mut push = |pen: u16, point: Point| {
         if let Ok(pose) = machine.pose_near(point, &near) {
             near = pose;
-            let exact = machine.ticks(&pose);
+            let exact = machine.motor_positions(&pose);
             let row = Row {
                 t_us: period_us * rows.len() as u64,
                 pen,
-                ticks: [exact.x.round() as i64, exact.y.round() as i64],
+                ticks: [exact[0].round() as i64, exact[1].round() as i64],
             };
-            rows.push((row, [exact.x, exact.y]));
+            rows.push((row, [exact[0], exact[1]]));
         }
     };
     push(0, machine.geometry().forward(&machine.start()));
@@ -94,8 +94,8 @@ fn fine_arm() -> Option<Machine> {
     let coarse = common::arm();
     let mut parts: MachineParts = coarse.parts().clone();
     parts.geometry = Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true });
-    parts.motors.iter_mut().for_each(|motor| motor.counts *= 100.0);
-    parts.start = Joints::new(1.0, 0.5);
+    parts.motors.iter_mut().for_each(|motor| motor.ticks_per_unit *= 100.0);
+    parts.start = JointPos::new(1.0, 0.5);
     Machine::new(parts).ok()
 }
 

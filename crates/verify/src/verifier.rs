@@ -1,7 +1,7 @@
 //! Row by row: what the table says about time, pen and poses, and the two paths it draws.
 
 use drawing::{Drawing, Point};
-use kinematics::{Joints, Machine};
+use kinematics::{JointPos, Machine, MotorPos};
 use plan::{Header, MOTORS, Row};
 
 use crate::{
@@ -24,7 +24,7 @@ const ROUNDING: (f64, f64) = (1e-9, 1e-6);
 /// Where the motors hold the pen.
 #[derive(Clone, Copy, Debug)]
 struct Pose {
-    joints: Joints,
+    joints: JointPos,
     point: Point,
 }
 
@@ -51,7 +51,7 @@ pub struct Verifier<'a> {
     tolerance: f64,
     park: [i64; MOTORS],
     /// How far half a tick on every motor may carry each joint out of its range.
-    joint_slack: Joints,
+    joint_slack: JointPos,
     target: Target,
     motors: [MotorCheck; MOTORS],
     failures: Failures,
@@ -111,18 +111,19 @@ impl<'a> Verifier<'a> {
         // Lengths follow the tolerance; without a sensible one the plan is still measured, and cannot hold.
         let scale = if tolerance_mm > 1e-6 { tolerance_mm.min(1e3) } else { 1e-6 };
         let target = Target::new(drawing, scale);
-        let start = machine.ticks(&machine.start());
+        let start = machine.motor_positions(&machine.start());
         let mut failures = Failures::default();
         for &stroke in &target.broken {
             let source = target.sources.get(stroke).copied();
             let location = Location { stroke: Some(stroke), source, ..Location::default() };
             failures.note(Violation::NotFinite, 0, 0.0, location);
         }
-        let half_tick = [Joints::new(0.5, 0.0), Joints::new(0.0, 0.5)].map(|tick| machine.joint_rates(&tick));
+        let half_tick =
+            [MotorPos::new(0.5, 0.0), MotorPos::new(0.0, 0.5)].map(|tick| machine.joint_rates(&tick));
         Self {
             machine,
             tolerance: tolerance_mm,
-            park: [start.x.round() as i64, start.y.round() as i64],
+            park: [start[0].round() as i64, start[1].round() as i64],
             joint_slack: half_tick[0].abs() + half_tick[1].abs(),
             motors: header.motors.clone().map(|motor| MotorCheck::new(motor, header.period_us)),
             failures,
@@ -132,7 +133,7 @@ impl<'a> Verifier<'a> {
             lift_overlap_us: header.lift_overlap_us,
             pens: Vec::new(),
             follows,
-            after: Trace::new(&target, scale, machine.tick_floor(&machine.start()), follows),
+            after: Trace::new(&target, scale, machine.quantization_error(&machine.start()), follows),
             before: None,
             target,
             largest_rounding: 0.0,
@@ -170,7 +171,7 @@ impl<'a> Verifier<'a> {
             _ => self.pose(row.ticks.map(|ticks| ticks as f64)),
         };
         let exact_pose = exact.map(|exact| self.pose(exact));
-        let finite = |pose: &Pose| pose.point.is_finite() && pose.joints.iter().all(|q| q.is_finite());
+        let finite = |pose: &Pose| pose.point.is_finite() && pose.joints.is_finite();
         if !finite(&ticks) || exact_pose.as_ref().is_some_and(|pose| !finite(pose)) {
             self.failures.note(Violation::NotFinite, 0, 0.0, here);
             return;
@@ -192,7 +193,7 @@ impl<'a> Verifier<'a> {
     }
 
     fn pose(&self, ticks: [f64; MOTORS]) -> Pose {
-        let joints = self.machine.joints(&Joints::new(ticks[0], ticks[1]));
+        let joints = self.machine.joint_positions(&MotorPos::new(ticks[0], ticks[1]));
         Pose { joints, point: self.machine.geometry().forward(&joints) }
     }
 
@@ -227,8 +228,8 @@ impl<'a> Verifier<'a> {
     }
 
     fn first(&mut self, current: &Previous, here: Location) {
-        let start = self.machine.ticks(&self.machine.start());
-        let expected = [start.x.round() as i64, start.y.round() as i64];
+        let start = self.machine.motor_positions(&self.machine.start());
+        let expected = [start[0].round() as i64, start[1].round() as i64];
         let Row { pen, ticks: found, .. } = current.row;
         if found != expected {
             let location = Location { point_mm: Some(current.ticks.point), ..here };
@@ -336,9 +337,9 @@ impl<'a> Verifier<'a> {
         }
         let lift = self.machine.pen();
         let (motion, time_s) = match (before, pen) {
-            (_, 0) => (PenMotion::Lift, lift.lift_time),
-            (0, _) => (PenMotion::Drop, lift.drop_time),
-            _ => (PenMotion::Change, lift.lift_time + lift.drop_time),
+            (_, 0) => (PenMotion::Lift, lift.lift_time_s),
+            (0, _) => (PenMotion::Drop, lift.drop_time_s),
+            _ => (PenMotion::Change, lift.lift_time_s + lift.drop_time_s),
         };
         // A planner may have cut the time to whole microseconds; 150000 must not become 150001 by a rounding error.
         let time_us = (time_s * 1e6 + 1e-3).floor() as u64;
@@ -452,7 +453,7 @@ impl<'a> Verifier<'a> {
 /// most; over one of `n` equal parts it is `B / n²`, and the path leaves that part's chord by `B / (8 n²)` at the most.
 fn draw(trace: &mut Trace, target: &Target, machine: &Machine, from: &Pose, to: &Pose, at: At) {
     let geometry = machine.geometry();
-    let bulge = geometry.bend(&from.joints, &to.joints) / 8.0;
+    let bulge = geometry.second_derivative_bound(&from.joints, &to.joints) / 8.0;
     let allowed = trace.tolerance() * BULGE;
     if bulge <= allowed {
         trace.to(target, to.point, bulge, at);
@@ -529,10 +530,9 @@ impl Floor {
     }
 
     fn add(&mut self, machine: &Machine, pose: &Pose, weight: f64) {
-        let worst = machine.tick_floor(&pose.joints);
-        let jacobian = machine.geometry().jacobian(&pose.joints);
-        let square: f64 = [Joints::new(1.0, 0.0), Joints::new(0.0, 1.0)]
-            .map(|tick| (jacobian * machine.joint_rates(&tick)).norm_squared())
+        let worst = machine.quantization_error(&pose.joints);
+        let square: f64 = [MotorPos::new(1.0, 0.0), MotorPos::new(0.0, 1.0)]
+            .map(|tick| machine.geometry().pen_velocity(&pose.joints, &machine.joint_rates(&tick)).hypot2())
             .iter()
             .sum();
         self.at = Some(pose.point);

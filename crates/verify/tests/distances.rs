@@ -4,7 +4,7 @@ mod common;
 
 use common::{Plotter, arm, cartesian, header, polar};
 use drawing::{Drawing, EllipticArc, Pen, Point, Span, Stroke, Vec2};
-use kinematics::{Joints, Machine};
+use kinematics::{Machine, MotorPos};
 use plan::Row;
 use proptest::prelude::*;
 use verify::{Certificate, Deviation, Verifier};
@@ -73,11 +73,11 @@ fn replay(machine: &Machine, rows: &[(u16, [f64; 2])], parts: usize) -> Lines {
             for k in 1..=parts {
                 let u = k as f64 / parts as f64;
                 let at = |m: usize| before[m] + u * (ticks[m] - before[m]);
-                line.push(machine.pen_at(&Joints::new(at(0), at(1))));
+                line.push(machine.forward_from_motors(&MotorPos::new(at(0), at(1))));
             }
         }
         if *pen != down && *pen != 0 {
-            lines.push((*pen, vec![machine.pen_at(&Joints::new(ticks[0], ticks[1]))]));
+            lines.push((*pen, vec![machine.forward_from_motors(&MotorPos::new(ticks[0], ticks[1]))]));
         }
         down = *pen;
     }
@@ -136,7 +136,7 @@ fn compare_both(
     let before = certificate.before_rounding.expect("every row came with exact positions");
     compare(&before, &replay(machine, rows, parts), &outline, 1.25 * TOLERANCE)?;
     let rounded: Vec<_> = rows.iter().map(|(pen, ticks)| (*pen, ticks.map(f64::round))).collect();
-    let floor = machine.tick_floor(&machine.start());
+    let floor = machine.quantization_error(&machine.start());
     let ink = replay(machine, &rounded, parts);
     compare(&certificate.after_rounding, &ink, &outline, 1.25 * (TOLERANCE + floor))?;
     let length: f64 = replay(machine, rows, parts)
@@ -215,8 +215,8 @@ fn rows_through(machine: &Machine, lines: &Lines) -> Vec<(u16, [f64; 2])> {
     let mut near = machine.start();
     let mut ticks = |p: Point| {
         near = machine.pose_near(p, &near).expect("a point within reach");
-        let exact = machine.ticks(&near);
-        [exact.x, exact.y]
+        let exact = machine.motor_positions(&near);
+        [exact[0], exact[1]]
     };
     let mut rows = vec![(0, ticks(machine.geometry().forward(&machine.start())))];
     for (pen, points) in lines {

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
-use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, TwoLink};
+use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::lift::Course;
 use planner::path::{Budget, Corner, sections};
 use planner::placement::{Size, Wish, place};
@@ -172,7 +172,14 @@ fn read(points: &[Point]) -> Result<Drawing> {
 
 fn motor(name: &str, counts: f64, speed: f64, acceleration: f64) -> Motor {
     let (max_speed, max_acceleration) = (counts * speed, counts * acceleration);
-    Motor { name: name.into(), counts, offset: 0.0, max_speed, max_acceleration, max_jerk: None }
+    Motor {
+        name: name.into(),
+        ticks_per_unit: counts,
+        offset_ticks: 0.0,
+        max_speed_ticks_s: max_speed,
+        max_acceleration_ticks_s2: max_acceleration,
+        max_jerk_ticks_s3: None,
+    }
 }
 
 fn corexy() -> Result<Machine> {
@@ -181,13 +188,18 @@ fn corexy() -> Result<Machine> {
         name: "workload".into(),
         geometry: Geometry::Cartesian(Cartesian),
         joints: [joint; 2],
-        min_dexterity: 0.0,
+        min_manipulability: 0.0,
         coupling: [[1.0, 1.0], [1.0, -1.0]],
         motors: ["a", "b"].map(|name| motor(name, TICKS_PER_MM, SPEED, ACCELERATION)),
-        pen: PenLift { max_speed: 1000.0, max_travel_speed: f64::INFINITY, lift_time: 0.15, drop_time: 0.15 },
+        pen: PenLimits {
+            max_speed_mm_s: 1000.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.15,
+            drop_time_s: 0.15,
+        },
         sheet: Rect::new(0.0, 0.0, 400.0, 400.0),
-        start: Joints::zeros(),
-        period: 0.01,
+        start: JointPos::ZERO,
+        period_s: 0.01,
     })?)
 }
 
@@ -198,13 +210,18 @@ fn arm() -> Result<Machine> {
         name: "arm".into(),
         geometry: Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
         joints: [Joint::FREE; 2],
-        min_dexterity: 0.1,
+        min_manipulability: 0.1,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: ["arm1", "arm2"].map(|name| motor(name, counts, 1.0, 5.0)),
-        pen: PenLift { max_speed: 60.0, max_travel_speed: f64::INFINITY, lift_time: 0.15, drop_time: 0.15 },
+        pen: PenLimits {
+            max_speed_mm_s: 60.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.15,
+            drop_time_s: 0.15,
+        },
         sheet: Rect::new(12.7, 76.2, 228.6, 355.6),
-        start: Joints::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
-        period: 0.01,
+        start: JointPos::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
+        period_s: 0.01,
     })?)
 }
 
@@ -234,8 +251,9 @@ impl Peaks {
                 for (k, motor) in machine.motors().iter().enumerate() {
                     let (now, now_ticks) = (exact[k] - from[k], ticks[k] - from_ticks[k]);
                     let acceleration = (now - step[k]).abs() / (period * period);
-                    peaks.speed = peaks.speed.max(now.abs() / period / motor.max_speed);
-                    peaks.acceleration = peaks.acceleration.max(acceleration / motor.max_acceleration);
+                    peaks.speed = peaks.speed.max(now.abs() / period / motor.max_speed_ticks_s);
+                    peaks.acceleration =
+                        peaks.acceleration.max(acceleration / motor.max_acceleration_ticks_s2);
                     peaks.ticks = peaks.ticks.max((now_ticks - tick_step[k]).abs() as f64);
                     (step[k], tick_step[k]) = (now, now_ticks);
                 }
@@ -286,7 +304,7 @@ impl Stages {
             lifted.collect::<Result<Vec<JointPath>>>()
         });
         let paths = paths?;
-        let cap = SpeedCap { pen: machine.pen().max_speed, row_deviation: f64::INFINITY, period: 1e-3 };
+        let cap = SpeedCap { pen: machine.pen().max_speed_mm_s, row_deviation: f64::INFINITY, period: 1e-3 };
         let law = |profile: fn(&Machine, &JointPath, &SpeedCap) -> Profile| {
             fastest(|| paths.iter().map(|path| profile(machine, path, &cap)).collect::<Vec<Profile>>())
         };
@@ -307,7 +325,11 @@ fn emission_seconds(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f6
         machine: machine.name().into(),
         motors: machine.motors().clone().map(|motor| plan::Motor {
             name: motor.name,
-            limits: plan::Limits { speed: motor.max_speed, acceleration: motor.max_acceleration, jerk: None },
+            limits: plan::Limits {
+                speed: motor.max_speed_ticks_s,
+                acceleration: motor.max_acceleration_ticks_s2,
+                jerk: None,
+            },
         }),
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: PERIOD_US,
@@ -403,9 +425,9 @@ fn nodes(machine: &Machine, path: &JointPath) -> String {
         let (first, second) =
             machine.motor_derivatives(&near, piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let (q, first, second) =
-            (machine.ticks(&near) / TICKS_PER_MM, first / TICKS_PER_MM, second / TICKS_PER_MM);
+            (machine.motor_positions(&near) / TICKS_PER_MM, first / TICKS_PER_MM, second / TICKS_PER_MM);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{s} {} {} {} {} {} {}", q.x, q.y, first.x, first.y, second.x, second.y);
+        let _ = writeln!(text, "{s} {} {} {} {} {} {}", q[0], q[1], first[0], first[1], second[0], second[1]);
     };
     let mut last = (0, 0.0);
     for cell in &path.cells {

@@ -1,9 +1,8 @@
 //! A planar arm of two links.
 
 use drawing::{Point, Vec2};
-use nalgebra::Matrix2;
 
-use super::{Joints, Unreachable, frame};
+use super::{JointPos, Unreachable, frame};
 
 /// `q = (theta, psi)`, the **absolute** angles of the first and second link:
 ///
@@ -39,11 +38,11 @@ pub struct TwoLink {
 }
 
 impl TwoLink {
-    pub(super) fn forward(self, q: &Joints) -> Point {
-        (self.l1 * frame(q.x).0 + self.l2 * frame(q.y).0).to_point()
+    pub(super) fn forward(self, q: &JointPos) -> Point {
+        (self.l1 * frame(q[0]).0 + self.l2 * frame(q[1]).0).to_point()
     }
 
-    pub(super) fn inverse(self, p: Point) -> Result<Joints, Unreachable> {
+    pub(super) fn inverse(self, p: Point) -> Result<JointPos, Unreachable> {
         let Self { l1, l2, elbow_left } = self;
         let r = libm::hypot(p.x, p.y);
         let (farthest, nearest) = (l1 + l2, (l1 - l2).abs());
@@ -71,17 +70,17 @@ impl TwoLink {
             (false, false) => psi + turn,
             _ => psi,
         };
-        Ok(Joints::new(theta, psi))
+        Ok(JointPos::new(theta, psi))
     }
 
-    pub(super) fn jacobian(self, q: &Joints) -> Matrix2<f64> {
-        let (t1, t2) = (self.l1 * frame(q.x).1, self.l2 * frame(q.y).1);
-        Matrix2::new(t1.x, t2.x, t1.y, t2.y)
+    pub(super) fn jacobian(self, q: &JointPos) -> [Vec2; 2] {
+        let [t1, t2] = [self.l1 * frame(q[0]).1, self.l2 * frame(q[1]).1];
+        [t1, t2]
     }
 
-    pub(super) fn path_derivatives(self, q: &Joints, first: Vec2, second: Vec2) -> (Joints, Joints) {
+    pub(super) fn path_derivatives(self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
         let Self { l1, l2, .. } = self;
-        let ((e1, t1), (e2, _)) = (frame(q.x), frame(q.y));
+        let ((e1, t1), (e2, _)) = (frame(q[0]), frame(q[1]));
         // sin and cos of beta from the two directions.
         let (sin, cos) = (t1.dot(e2), e1.dot(e2));
         let theta_1 = first.dot(e2) / (l1 * sin);
@@ -89,29 +88,35 @@ impl TwoLink {
         let (w1, w2) = (l1 * theta_1 * theta_1, l2 * psi_1 * psi_1);
         let theta_2 = (second.dot(e2) + w1 * cos + w2) / (l1 * sin);
         let psi_2 = -(second.dot(e1) + w1 + w2 * cos) / (l2 * sin);
-        (Joints::new(theta_1, psi_1), Joints::new(theta_2, psi_2))
+        (JointPos::new(theta_1, psi_1), JointPos::new(theta_2, psi_2))
     }
 
-    pub(super) fn path_third_derivative(self, q: &Joints, first: Vec2, second: Vec2, third: Vec2) -> Joints {
+    pub(super) fn path_third_derivative(
+        self,
+        q: &JointPos,
+        first: Vec2,
+        second: Vec2,
+        third: Vec2,
+    ) -> JointPos {
         let Self { l1, l2, .. } = self;
-        let ((e1, t1), (e2, _)) = (frame(q.x), frame(q.y));
+        let ((e1, t1), (e2, _)) = (frame(q[0]), frame(q[1]));
         let (sin, cos) = (t1.dot(e2), e1.dot(e2));
         let (rates, turns) = self.path_derivatives(q, first, second);
-        let (u, w) = (3.0 * l1 * rates.x * turns.x, 3.0 * l2 * rates.y * turns.y);
+        let (u, w) = (3.0 * l1 * rates[0] * turns[0], 3.0 * l2 * rates[1] * turns[1]);
         let cube = |rate: f64| rate * rate * rate;
-        let theta_3 = (third.dot(e2) + u * cos + w) / (l1 * sin) + cube(rates.x);
-        let psi_3 = -(third.dot(e1) + u + w * cos) / (l2 * sin) + cube(rates.y);
-        Joints::new(theta_3, psi_3)
+        let theta_3 = (third.dot(e2) + u * cos + w) / (l1 * sin) + cube(rates[0]);
+        let psi_3 = -(third.dot(e1) + u + w * cos) / (l2 * sin) + cube(rates[1]);
+        JointPos::new(theta_3, psi_3)
     }
 
     /// d²p/du² = -L1 theta'^2 e(theta) - L2 psi'^2 e(psi), whatever the coupling.
-    pub(super) fn bend(self, from: &Joints, to: &Joints) -> f64 {
-        let change = to - from;
-        self.l1 * change.x * change.x + self.l2 * change.y * change.y
+    pub(super) fn second_derivative_bound(self, from: &JointPos, to: &JointPos) -> f64 {
+        let change = *to - *from;
+        self.l1 * change[0] * change[0] + self.l2 * change[1] * change[1]
     }
 
     /// |sin beta|.
-    pub(super) fn dexterity(self, q: &Joints) -> f64 {
-        libm::sin(q.y - q.x).abs()
+    pub(super) fn manipulability(self, q: &JointPos) -> f64 {
+        libm::sin(q[1] - q[0]).abs()
     }
 }

@@ -194,7 +194,7 @@ impl Law {
                 let second = 0.5 * (cell.second[half] + cell.second[half + 1]);
                 for (k, motor) in machine.motors().iter().enumerate() {
                     let acceleration = (first[k] * u + second[k] * b).abs();
-                    excess = excess.max(acceleration * (1.0 + cell.slack) / motor.max_acceleration);
+                    excess = excess.max(acceleration * (1.0 + cell.slack) / motor.max_acceleration_ticks_s2);
                 }
             }
         }

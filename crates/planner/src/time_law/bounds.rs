@@ -70,7 +70,7 @@ impl Bounds {
         };
         lower(rows / cell.bend, Cap::Rows);
         for (k, motor) in machine.motors().iter().enumerate() {
-            let limit = motor.max_acceleration / (1.0 + cell.slack);
+            let limit = motor.max_acceleration_ticks_s2 / (1.0 + cell.slack);
             let mut fastest = 0.0_f64;
             for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
                 let (m1, m2) = (cell.first[j][k] / limit, cell.second[j][k] / limit);
@@ -78,7 +78,7 @@ impl Bounds {
                 strips[3 * k + j] = if p < 0.0 { Strip { p: -p, r: -m2 } } else { Strip { p, r: m2 } };
                 fastest = fastest.max(cell.first[j][k].abs());
             }
-            let speed = motor.max_speed / (fastest * (1.0 + cell.slack));
+            let speed = motor.max_speed_ticks_s / (fastest * (1.0 + cell.slack));
             lower(speed * speed, Cap::Motor(k));
         }
         if cell.near_turn {

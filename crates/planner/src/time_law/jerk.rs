@@ -21,8 +21,7 @@
 //! made slower by as much; so is all of it where no way was found.
 
 use drawing::Segment;
-use kinematics::{Joints, Machine};
-use nalgebra::Vector2;
+use kinematics::{JointPos, Machine, MotorPos};
 
 use super::polygon::Polygon;
 use super::{Phase, Profile, SpeedCap, acceleration, straight};
@@ -41,7 +40,7 @@ const EXCESS: f64 = 1.002;
 
 /// Whether any motor's jerk is limited.
 pub(super) fn applies(machine: &Machine) -> bool {
-    machine.motors().iter().any(|motor| motor.max_jerk.is_some())
+    machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some())
 }
 
 /// The law on a path.
@@ -91,15 +90,15 @@ struct Place {
 impl Place {
     fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
         let t = (s * piece.rate).clamp(0.0, 1.0);
-        let pose: Joints = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
+        let pose: JointPos = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
         let Rates { first: m1, second: m2, pen_speed, bend, .. } = Rates::of(machine, piece, t, &pose);
         let m3 = third_derivative(machine, piece, t, &pose);
         let motors = machine.motors();
-        let of = |k: usize, m: &Vector2<f64>, limit: f64| m[k] / limit;
-        let jerk = |k: usize| motors[k].max_jerk.unwrap_or(f64::INFINITY);
+        let of = |k: usize, m: &MotorPos, limit: f64| m[k] / limit;
+        let jerk = |k: usize| motors[k].max_jerk_ticks_s3.unwrap_or(f64::INFINITY);
         Some(Self {
-            speed: [0, 1].map(|k| of(k, &m1, motors[k].max_speed)),
-            acceleration: [0, 1].map(|k| [&m1, &m2].map(|m| of(k, m, motors[k].max_acceleration))),
+            speed: [0, 1].map(|k| of(k, &m1, motors[k].max_speed_ticks_s)),
+            acceleration: [0, 1].map(|k| [&m1, &m2].map(|m| of(k, m, motors[k].max_acceleration_ticks_s2))),
             jerk: [0, 1].map(|k| [&m1, &m2, &m3].map(|m| of(k, m, jerk(k)))),
             pen_speed,
             bend,
@@ -244,8 +243,10 @@ fn cells(
     fastest: &Profile,
 ) -> Option<Vec<Cell>> {
     let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
-    let build_up =
-        machine.motors().iter().filter_map(|motor| motor.max_jerk.map(|jerk| motor.max_acceleration / jerk));
+    let build_up = machine
+        .motors()
+        .iter()
+        .filter_map(|motor| motor.max_jerk_ticks_s3.map(|jerk| motor.max_acceleration_ticks_s2 / jerk));
     let build_up = build_up.fold(0.0, f64::max);
     let total: f64 = path.cells.iter().map(|cell| cell.length).sum();
     let mut speeds = Speeds { phases: &fastest.phases, at: 0 };
@@ -257,7 +258,7 @@ fn cells(
             .motors()
             .iter()
             .enumerate()
-            .map(|(k, motor)| motor.max_acceleration / cell.first[1][k].abs());
+            .map(|(k, motor)| motor.max_acceleration_ticks_s2 / cell.first[1][k].abs());
         let ramp = 0.02 * acceleration.fold(f64::INFINITY, f64::min) * build_up * build_up;
         let longest = cell.length / if matches!(piece.curve, Segment::Line(_)) { 1.0 } else { 2.0 };
         let mut at = 0.0;
@@ -633,7 +634,9 @@ fn duration(length: f64, from: State, to: State, w: f64) -> f64 {
 /// that rows a period apart could show.
 fn slowed_until_smooth(machine: &Machine, profile: Profile, cap: &SpeedCap) -> Profile {
     let of = |motor: &kinematics::Motor| {
-        motor.max_jerk.map_or(1.0, |jerk| (2.0 * motor.max_acceleration / (jerk * cap.period)).sqrt())
+        motor
+            .max_jerk_ticks_s3
+            .map_or(1.0, |jerk| (2.0 * motor.max_acceleration_ticks_s2 / (jerk * cap.period)).sqrt())
     };
     let slower = machine.motors().iter().map(of).fold(1.0, f64::max);
     profile.slowed(slower)

@@ -2,11 +2,20 @@
 #![allow(dead_code, reason = "not every test that shares this module needs all of it")]
 
 use drawing::Rect;
-use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar, TwoLink};
+use kinematics::{
+    Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, Polar, TwoLink,
+};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 pub(crate) fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
-    Motor { name: name.into(), counts, offset, max_speed, max_acceleration, max_jerk: None }
+    Motor {
+        name: name.into(),
+        ticks_per_unit: counts,
+        offset_ticks: offset,
+        max_speed_ticks_s: max_speed,
+        max_acceleration_ticks_s2: max_acceleration,
+        max_jerk_ticks_s3: None,
+    }
 }
 
 fn build(
@@ -15,19 +24,24 @@ fn build(
     coupling: [[f64; 2]; 2],
     motors: [Motor; 2],
     sheet: Rect,
-    start: Joints,
+    start: JointPos,
 ) -> Machine {
     Machine::new(MachineParts {
         name: "test".into(),
         geometry,
         joints,
-        min_dexterity: if matches!(geometry, Geometry::TwoLink(_)) { 0.1 } else { 0.0 },
+        min_manipulability: if matches!(geometry, Geometry::TwoLink(_)) { 0.1 } else { 0.0 },
         coupling,
         motors,
-        pen: PenLift { max_speed: 60.0, max_travel_speed: f64::INFINITY, lift_time: 0.12, drop_time: 0.15 },
+        pen: PenLimits {
+            max_speed_mm_s: 60.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.12,
+            drop_time_s: 0.15,
+        },
         sheet,
         start,
-        period: 0.01,
+        period_s: 0.01,
     })
     .expect("the parts make a machine")
 }
@@ -40,7 +54,7 @@ pub(crate) fn arm() -> Machine {
         [[1.0, 0.0], [0.0, -1.0]],
         [motor("arm1", counts, 0.0, 533.0, 2667.0), motor("arm2", counts, 800.0, 533.0, 2667.0)],
         Rect::new(12.7, 76.2, 228.6, 355.6),
-        Joints::new(FRAC_PI_2, FRAC_PI_2),
+        JointPos::new(FRAC_PI_2, FRAC_PI_2),
     )
 }
 
@@ -51,7 +65,7 @@ pub(crate) fn corexy() -> Machine {
         [[1.0, 1.0], [1.0, -1.0]],
         [motor("a", 92.0, 0.0, 4000.0, 30000.0), motor("b", 92.0, 0.0, 4000.0, 30000.0)],
         Rect::new(0.0, 0.0, 200.0, 200.0),
-        Joints::new(0.0, 0.0),
+        JointPos::new(0.0, 0.0),
     )
 }
 
@@ -65,7 +79,7 @@ pub(crate) fn polar() -> Machine {
             motor("r", 360.0 / 44.0, -138.0 * 360.0 / 44.0, 360.0, 3600.0),
         ],
         Rect::new(-138.0, 0.0, 138.0, 138.0),
-        Joints::new(FRAC_PI_2, 138.0),
+        JointPos::new(FRAC_PI_2, 138.0),
     )
 }
 
@@ -73,7 +87,7 @@ pub(crate) fn polar() -> Machine {
 pub(crate) fn with_jerk(machine: &Machine, build_up: f64) -> Machine {
     let mut parts = machine.parts().clone();
     for motor in &mut parts.motors {
-        motor.max_jerk = Some(motor.max_acceleration / build_up);
+        motor.max_jerk_ticks_s3 = Some(motor.max_acceleration_ticks_s2 / build_up);
     }
     Machine::new(parts).expect("a machine with another limit is one")
 }

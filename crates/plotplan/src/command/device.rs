@@ -9,7 +9,7 @@ use anyhow::Context as _;
 use backends::device::{Device as Machine, Ebb, Faulty, Grbl, Ticks, XyPlotter};
 use compiler::pipeline;
 use drawing::{Point, Rect};
-use kinematics::Joints;
+use kinematics::MotorPos;
 use picture::{Ink, Scene};
 
 use crate::cli::{Device, DeviceProtocol};
@@ -58,8 +58,8 @@ fn device(arguments: &Device, machine: Option<&LoadedMachine>) -> Box<dyn Machin
 
 /// Where a machine's motors are when it has been homed.
 fn start(machine: &LoadedMachine) -> [i64; 2] {
-    let ticks = machine.machine.ticks(&machine.machine.start());
-    [ticks.x.round() as i64, ticks.y.round() as i64]
+    let ticks = machine.machine.motor_positions(&machine.machine.start());
+    [ticks[0].round() as i64, ticks[1].round() as i64]
 }
 
 /// The clock that the machine lives by.
@@ -155,7 +155,9 @@ fn scene(arguments: &Device, machine: Option<&LoadedMachine>, ink: &backends::In
         _ => [0.0; 2],
     };
     let place = |place: &[f64; 2]| match machine {
-        Some(machine) => machine.machine.pen_at(&Joints::new(place[0] + from[0], place[1] + from[1])),
+        Some(machine) => {
+            machine.machine.forward_from_motors(&MotorPos::new(place[0] + from[0], place[1] + from[1]))
+        }
         None => Point::new(place[0], place[1]),
     };
     let lines = ink.lines();

@@ -3,7 +3,7 @@
 use backends::{Instant, WriteError, ebb, gcode};
 use compiler::pipeline::Compiled;
 use drawing::{Pen, Point};
-use kinematics::{Geometry, Joints, Machine};
+use kinematics::{Geometry, Machine, MotorPos};
 use planner::ExactRow;
 
 use crate::cli::{Convert, Format, PenBy, PenLift};
@@ -45,7 +45,7 @@ pub(crate) fn write(arguments: &Convert, machine: &Machine, compiled: &Compiled<
 
 /// The instants of a plan: rows with what firmware formats want to know beside them.
 pub(crate) fn instant(machine: &Machine, row: plan::Row, exact: [f64; 2]) -> Instant {
-    let joints = machine.joints(&Joints::from(exact));
+    let joints = machine.joint_positions(&MotorPos::from(exact));
     Instant { row, exact, joints: joints.into(), at: machine.geometry().forward(&joints) }
 }
 
@@ -127,8 +127,8 @@ pub(crate) fn gcode_options(flavour: gcode::Flavour, machine: &Machine, pen: Pen
     gcode::Options {
         flavour,
         pen: by,
-        pen_s: [lift.lift_time, lift.drop_time],
-        travel_mm_s: lift.max_speed,
+        pen_s: [lift.lift_time_s, lift.drop_time_s],
+        travel_mm_s: lift.max_speed_mm_s,
         chord_mm: CHORD_MM,
     }
 }
@@ -152,7 +152,7 @@ fn stroke_speeds(machine: &Machine, compiled: &Compiled<'_>) -> Vec<f64> {
         pen = before.map_or(0, |last| last.pen);
         before = Some(row);
     }
-    let most = machine.pen().max_speed;
+    let most = machine.pen().max_speed_mm_s;
     let strokes = compiled.ordered().strokes.iter().enumerate();
     strokes
         .map(|(index, stroke)| {
@@ -165,8 +165,8 @@ fn stroke_speeds(machine: &Machine, compiled: &Compiled<'_>) -> Vec<f64> {
 /// Whether the format is one for machines of this shape.
 fn suits(format: Format, machine: &Machine) -> Result<(), Failure> {
     let geometry = machine.geometry();
-    let coupling = machine.coupling().matrix();
-    let is = |rows: [[f64; 2]; 2]| (0..2).all(|i| (0..2).all(|j| coupling[(i, j)] == rows[i][j]));
+    let coupling = machine.coupling().rows();
+    let is = |rows: [[f64; 2]; 2]| (0..2).all(|i| (0..2).all(|j| coupling[i][j] == rows[i][j]));
     let (holds, wants) = match format {
         Format::CoaxialCommands | Format::CoaxialCommandsInches => {
             (matches!(geometry, Geometry::TwoLink(_)), "an arm with two links, such as coaxial")

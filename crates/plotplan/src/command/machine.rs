@@ -41,30 +41,34 @@ fn check(file: &str) -> Result<String, Failure> {
     let mut text = format!("{} holds together\n", machine.name());
     let joints = machine.geometry().joint_names();
     for (k, motor) in machine.motors().iter().enumerate() {
-        let row = machine.coupling().matrix().row(k);
+        let row = machine.coupling().rows()[k];
         let _ = write!(
             text,
             "motor {}: {:.4} * ({} {} + {} {}) + {:.4} ticks, at most {:.1} ticks/s, {:.1} ticks/s2",
             motor.name,
-            motor.counts,
+            motor.ticks_per_unit,
             row[0],
             joints[0],
             row[1],
             joints[1],
-            motor.offset,
-            motor.max_speed,
-            motor.max_acceleration
+            motor.offset_ticks,
+            motor.max_speed_ticks_s,
+            motor.max_acceleration_ticks_s2
         );
-        if let Some(jerk) = motor.max_jerk {
+        if let Some(jerk) = motor.max_jerk_ticks_s3 {
             let _ = write!(text, ", {jerk:.1} ticks/s3");
         }
         text.push('\n');
     }
-    let start = machine.ticks(&machine.start());
-    let _ = writeln!(text, "start at ticks {}, {}", start.x.round(), start.y.round());
+    let start = machine.motor_positions(&machine.start());
+    let _ = writeln!(text, "start at ticks {}, {}", start[0].round(), start[1].round());
     let middle = sheet.center();
     if let Ok(pose) = machine.pose_near(middle, &machine.start()) {
-        let _ = writeln!(text, "tick floor in the middle of the sheet: {:.4} mm", machine.tick_floor(&pose));
+        let _ = writeln!(
+            text,
+            "tick floor in the middle of the sheet: {:.4} mm",
+            machine.quantization_error(&pose)
+        );
     }
     let corners = [
         Point::new(sheet.x0, sheet.y0),

@@ -1,7 +1,7 @@
 //! Where a plan's rows take the pen.
 
 use drawing::{Drawing, Pen, Point, Span, Stroke};
-use kinematics::{Joints, Machine};
+use kinematics::{Machine, MotorPos};
 use picture::Ink;
 use plan::Row;
 
@@ -20,7 +20,7 @@ impl Motion {
         let mut travel: Vec<Vec<Point>> = Vec::new();
         let mut pen = None;
         for pair in rows.windows(2) {
-            let ends = [pair[0], pair[1]].map(|row| Joints::from(row.ticks.map(|ticks| ticks as f64)));
+            let ends = [pair[0], pair[1]].map(|row| MotorPos::from(row.ticks.map(|ticks| ticks as f64)));
             let path = chords(machine, ends[0], ends[1], chord_mm);
             if pen != Some(pair[0].pen) {
                 pen = Some(pair[0].pen);
@@ -50,8 +50,12 @@ impl Motion {
 }
 
 /// The pen's path while the motors move linearly between two rows.
-fn chords(machine: &Machine, from: Joints, to: Joints, chord_mm: f64) -> Vec<Point> {
-    let bend = machine.geometry().bend(&machine.joints(&from), &machine.joints(&to));
+fn chords(machine: &Machine, from: MotorPos, to: MotorPos, chord_mm: f64) -> Vec<Point> {
+    let bend = machine
+        .geometry()
+        .second_derivative_bound(&machine.joint_positions(&from), &machine.joint_positions(&to));
     let pieces = (bend / (8.0 * chord_mm)).sqrt().ceil().clamp(1.0, 1000.0) as usize;
-    (0..=pieces).map(|k| machine.pen_at(&(from + (k as f64 / pieces as f64) * (to - from)))).collect()
+    (0..=pieces)
+        .map(|k| machine.forward_from_motors(&(from + (k as f64 / pieces as f64) * (to - from))))
+        .collect()
 }

@@ -3,7 +3,9 @@
 #![allow(dead_code, unreachable_pub, reason = "each test uses its own part")]
 
 use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
-use kinematics::{Cartesian, Geometry, Joint, Joints, Machine, MachineParts, Motor, PenLift, Polar, TwoLink};
+use kinematics::{
+    Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, Polar, TwoLink,
+};
 use plan::{Header, Limits, Row};
 use verify::{Certificate, Verifier};
 
@@ -11,28 +13,40 @@ use verify::{Certificate, Verifier};
 pub const PERIOD_US: u64 = 10_000;
 
 fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
-    Motor { name: name.into(), counts, offset, max_speed, max_acceleration, max_jerk: None }
+    Motor {
+        name: name.into(),
+        ticks_per_unit: counts,
+        offset_ticks: offset,
+        max_speed_ticks_s: max_speed,
+        max_acceleration_ticks_s2: max_acceleration,
+        max_jerk_ticks_s3: None,
+    }
 }
 
-fn parts(name: &str, geometry: Geometry, motors: [Motor; 2], start: Joints) -> MachineParts {
+fn parts(name: &str, geometry: Geometry, motors: [Motor; 2], start: JointPos) -> MachineParts {
     MachineParts {
         name: name.into(),
         geometry,
         joints: [Joint::FREE; 2],
-        min_dexterity: 0.0,
+        min_manipulability: 0.0,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors,
-        pen: PenLift { max_speed: 100.0, max_travel_speed: f64::INFINITY, lift_time: 0.15, drop_time: 0.2 },
+        pen: PenLimits {
+            max_speed_mm_s: 100.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.15,
+            drop_time_s: 0.2,
+        },
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start,
-        period: 0.01,
+        period_s: 0.01,
     }
 }
 
 /// x and y at 100 ticks/mm, 100 mm/s and 1000 mm/s²; joints from 0 to 200 mm; starts at (0, 0).
 pub fn cartesian() -> Machine {
     let motors = [motor("x", 100.0, 0.0, 1e4, 1e5), motor("y", 100.0, 0.0, 1e4, 1e5)];
-    let mut parts = parts("cartesian", Geometry::Cartesian(Cartesian), motors, Joints::new(0.0, 0.0));
+    let mut parts = parts("cartesian", Geometry::Cartesian(Cartesian), motors, JointPos::new(0.0, 0.0));
     parts.joints = [Joint { min: 0.0, max: 200.0 }; 2];
     Machine::new(parts).expect("a sound machine")
 }
@@ -43,13 +57,14 @@ pub fn arm() -> Machine {
     let up = std::f64::consts::FRAC_PI_2;
     let motors = [motor("arm1", counts, 0.0, 533.3, 2666.7), motor("arm2", -counts, 800.0, 533.3, 2666.7)];
     let arm = TwoLink { l1: 206.0, l2: 256.0, elbow_left: true };
-    Machine::new(parts("arm", Geometry::TwoLink(arm), motors, Joints::new(up, up))).expect("a sound machine")
+    Machine::new(parts("arm", Geometry::TwoLink(arm), motors, JointPos::new(up, up)))
+        .expect("a sound machine")
 }
 
 /// Angle and radius, the angle in steps of 1/2000 rad.
 pub fn polar() -> Machine {
     let motors = [motor("phi", 2000.0, 0.0, 4e3, 4e4), motor("r", 100.0, 0.0, 1e4, 1e5)];
-    Machine::new(parts("polar", Geometry::Polar(Polar), motors, Joints::new(0.5, 60.0)))
+    Machine::new(parts("polar", Geometry::Polar(Polar), motors, JointPos::new(0.5, 60.0)))
         .expect("a sound machine")
 }
 
@@ -58,7 +73,11 @@ pub fn header(machine: &Machine) -> Header {
         machine: machine.name().into(),
         motors: machine.motors().clone().map(|motor| plan::Motor {
             name: motor.name,
-            limits: Limits { speed: motor.max_speed, acceleration: motor.max_acceleration, jerk: None },
+            limits: Limits {
+                speed: motor.max_speed_ticks_s,
+                acceleration: motor.max_acceleration_ticks_s2,
+                jerk: None,
+            },
         }),
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: PERIOD_US,
@@ -86,7 +105,7 @@ pub struct Plotter<'a> {
     pub period_us: u64,
     /// Speed of the motors as a share of their limits.
     pub haste: f64,
-    joints: Joints,
+    joints: JointPos,
 }
 
 impl<'a> Plotter<'a> {
@@ -104,10 +123,10 @@ impl<'a> Plotter<'a> {
     }
 
     fn push(&mut self, t_us: u64, pen: u16) {
-        let exact = self.machine.ticks(&self.joints);
-        let ticks = [exact.x.round() as i64, exact.y.round() as i64];
+        let exact = self.machine.motor_positions(&self.joints);
+        let ticks = [exact[0].round() as i64, exact[1].round() as i64];
         self.rows.push(Row { t_us, pen, ticks });
-        self.exact.push([exact.x, exact.y]);
+        self.exact.push([exact[0], exact[1]]);
     }
 
     fn last(&self) -> Row {
@@ -129,13 +148,13 @@ impl<'a> Plotter<'a> {
         }
         let last = self.rows.len() - 1;
         self.rows[last].pen = pen;
-        let PenLift { lift_time, drop_time, .. } = *self.machine.pen();
+        let PenLimits { lift_time_s: lift_time, drop_time_s: drop_time, .. } = *self.machine.pen();
         self.rest(if pen == 0 { lift_time } else { drop_time })
     }
 
     /// Poses along a path, `u` from 0 to 1, as fast as the motors allow.
-    fn follow(&mut self, path: impl Fn(f64) -> Joints) -> &mut Self {
-        let ticks = |u: f64| self.machine.ticks(&path(u * u * (3.0 - 2.0 * u)));
+    fn follow(&mut self, path: impl Fn(f64) -> JointPos) -> &mut Self {
+        let ticks = |u: f64| self.machine.motor_positions(&path(u * u * (3.0 - 2.0 * u)));
         let dt = self.period_us as f64 * 1e-6;
         let too_fast = |steps: usize| {
             let at = |k: usize| ticks((k as f64 / steps as f64).min(1.0));
@@ -144,8 +163,9 @@ impl<'a> Plotter<'a> {
                 let (a, b, c) = (at(k.abs_diff(1)), at(k), at(k + 1));
                 (0..2).any(|m| {
                     let motor = &self.machine.motors()[m];
-                    (c[m] - b[m]).abs() > self.haste * motor.max_speed * dt
-                        || (c[m] - 2.0 * b[m] + a[m]).abs() > self.haste * motor.max_acceleration * dt * dt
+                    (c[m] - b[m]).abs() > self.haste * motor.max_speed_ticks_s * dt
+                        || (c[m] - 2.0 * b[m] + a[m]).abs()
+                            > self.haste * motor.max_acceleration_ticks_s2 * dt * dt
                 })
             })
         };
@@ -154,7 +174,7 @@ impl<'a> Plotter<'a> {
             steps += 1 + steps / 64;
         }
         let Row { t_us, pen, .. } = self.last();
-        let poses: Vec<Joints> = (1..=steps)
+        let poses: Vec<JointPos> = (1..=steps)
             .map(|k| {
                 let u = k as f64 / steps as f64;
                 path(u * u * (3.0 - 2.0 * u))
@@ -180,7 +200,7 @@ impl<'a> Plotter<'a> {
         self.travel_to(to)
     }
 
-    pub fn travel_to(&mut self, to: Joints) -> &mut Self {
+    pub fn travel_to(&mut self, to: JointPos) -> &mut Self {
         let from = self.joints;
         self.follow(|u| from + (to - from) * u)
     }
