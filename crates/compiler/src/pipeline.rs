@@ -1,6 +1,6 @@
 //! From a drawing to a certified plan: each room's work, one after the other.
 
-use drawing::{Affine, Drawing, Pen, Point, Rect, Segment};
+use drawing::{Affine, Drawing, Pen, Point, Segment};
 use kinematics::{JointPos, Machine};
 use plan::{Header, Limits, Motor};
 use planner::placement::{self, Wish};
@@ -213,59 +213,6 @@ fn pieces_of(drawing: &Drawing) -> Vec<(u16, [[i64; 2]; 3])> {
     }
     pieces.sort_unstable();
     pieces
-}
-
-/// The outlines of what a machine can reach, machine mm, for pictures; empty where only the sheet limits it.
-pub fn reach_outlines(machine: &Machine) -> Vec<Vec<Point>> {
-    // The border between reachable and not, along rays from the base: each ray enters and leaves the reach once.
-    let Some(base) = machine.geometry().base() else {
-        let joints = machine.parts().joints;
-        let bed = Rect::new(joints[0].min, joints[1].min, joints[0].max, joints[1].max);
-        if !bed.is_finite() {
-            return Vec::new();
-        }
-        return vec![vec![
-            Point::new(bed.x0, bed.y0),
-            Point::new(bed.x1, bed.y0),
-            Point::new(bed.x1, bed.y1),
-            Point::new(bed.x0, bed.y1),
-        ]];
-    };
-    let reachable = |p: Point| machine.check_point(p).is_ok();
-    let mut inner = Vec::new();
-    let mut outer = Vec::new();
-    let mut whole_turn = true;
-    for degree in 0..=360 {
-        let (sin, cos) = libm::sincos(f64::from(degree) * std::f64::consts::PI / 180.0);
-        let at = |r: f64| base + r * drawing::Vec2::new(cos, sin);
-        let Some((near, far)) = reach_along(&|r| reachable(at(r))) else {
-            whole_turn = false;
-            continue;
-        };
-        inner.push(at(near));
-        outer.push(at(far));
-    }
-    if whole_turn {
-        return vec![outer, inner];
-    }
-    inner.reverse();
-    outer.extend(inner);
-    vec![outer]
-}
-
-/// The first and the last distance at which `reachable` holds, to a hundredth of a mm; looked for in steps of 1 mm up to 3 m.
-fn reach_along(reachable: &dyn Fn(f64) -> bool) -> Option<(f64, f64)> {
-    let samples = || (1..3000).map(f64::from);
-    let first = samples().find(|r| reachable(*r))?;
-    let last = samples().skip(first as usize).take_while(|r| reachable(*r)).last().unwrap_or(first);
-    let border = |mut inside: f64, mut outside: f64| {
-        while (inside - outside).abs() > 0.01 {
-            let middle = 0.5 * (inside + outside);
-            if reachable(middle) { inside = middle } else { outside = middle }
-        }
-        inside
-    };
-    Some((border(first, first - 1.0), border(last, last + 1.0)))
 }
 
 #[cfg(test)]

@@ -13,9 +13,11 @@ pub mod geometry;
 mod machine;
 mod position;
 mod reach;
+mod workspace;
 
 pub use coupling::{Coupling, SingularCoupling};
 pub use geometry::{Cartesian, Geometry, Polar, TwoLink, Unreachable};
 pub use machine::{Joint, Machine, MachineError, MachineParts, Motor, PenLimits};
 pub use position::{JointPos, MotorPos};
 pub use reach::{Fault, OutOfReach};
+pub use workspace::reach_outlines;

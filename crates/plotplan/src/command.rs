@@ -12,12 +12,10 @@ mod preview;
 mod send;
 mod verify;
 
-use std::fmt::Write as _;
-
 use clap::CommandFactory as _;
+use compiler::import::{self, Page, PenSettings};
 use compiler::pipeline::{Order, Request};
 use drawing::Pen;
-use hpgl::{Page, PenSettings};
 use kinematics::Machine;
 use planner::placement::{Size, Wish};
 use planner::{Ease, Law};
@@ -40,14 +38,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
             if explain.code == "plotters" {
-                return output::write("-", |out| out.write_all(plotters().as_bytes()));
+                return output::write("-", |out| out.write_all(import::plotters().as_bytes()));
             }
-            let Some(code) = hpgl::Code::from_name(&explain.code) else {
-                let what =
-                    format!("there is no code {}; codes stand in brackets in diagnostics", explain.code);
+            let Some((title, explanation)) = import::explain(&explain.code) else {
+                let what = format!("unknown diagnostic code {} (e.g. H0101)", explain.code);
                 return Err(Failure::Usage(anyhow::anyhow!(what)));
             };
-            let text = format!("{code}: {} ({})\n\n{}\n", code.title(), code.severity(), code.explanation());
+            let text = format!("{title}\n\n{explanation}\n");
             output::write("-", |out| out.write_all(text.as_bytes()))
         }
         Command::Completions(completions) => output::write("-", |out| {
@@ -122,14 +119,4 @@ fn law(planning: &Planning) -> Law {
         cli::Law::Sine => eased(Ease::SineOut),
         cli::Law::Quadratic => eased(Ease::QuadraticInOut),
     }
-}
-
-/// The plotters and papers that are known, for people.
-fn plotters() -> String {
-    let mut text = String::new();
-    for plotter in hpgl::plotters() {
-        let papers: Vec<&str> = plotter.papers.iter().map(|paper| paper.name).collect();
-        let _ = writeln!(text, "{:<12} {}; papers: {}", plotter.name, plotter.title, papers.join(", "));
-    }
-    text
 }

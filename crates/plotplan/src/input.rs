@@ -4,9 +4,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use compiler::import::{self, Document, Page, Severity};
 use compiler::machine_file::{MachineFile, PRESETS, nearest};
+use compiler::report;
 use drawing::Drawing;
-use hpgl::{Document, Severity};
 use kinematics::Machine;
 
 use crate::cli;
@@ -40,15 +41,15 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
 pub(crate) const STRICT: &str = "there are warnings, and --strict takes them for errors";
 
 /// A drawing's file, read, and the page that was asked for.
-pub(crate) struct Drawn {
-    pub(crate) reading: Document,
+pub(crate) struct LoadedDrawing {
+    pub(crate) document: Document,
     page: usize,
 }
 
-impl Drawn {
+impl LoadedDrawing {
     /// The page that was asked for.
-    pub(crate) fn page(&self) -> &hpgl::Page {
-        &self.reading.pages[self.page]
+    pub(crate) fn page(&self) -> &Page {
+        &self.document.pages[self.page]
     }
 
     /// Its drawing.
@@ -57,49 +58,22 @@ impl Drawn {
     }
 }
 
-/// Reads a drawing and says what there is to say about it. With `--strict` a warning refuses it.
-pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<Drawn, Failure> {
-    let options = match &arguments.plotter {
-        None => hpgl::Options::default(),
-        Some(plotter) => hpgl::Options::for_plotter(plotter, arguments.paper.as_deref())
-            .ok_or_else(|| Failure::Usage(unknown_plotter(plotter, arguments.paper.as_deref())))?,
-    };
-    let reading = if compiler::import::points::looks_like_points(&input.bytes) {
-        let drawing = compiler::import::points::read(&input.bytes);
-        let page = hpgl::Page { drawing, ..hpgl::Page::default() };
-        Document { pages: vec![page], diagnostics: Vec::new(), ..hpgl::read(b"", &options) }
-    } else {
-        hpgl::read(&input.bytes, &options)
-    };
-    terminal::diagnostics(input, &reading.diagnostics, arguments.message_format);
-    let pages = reading.pages.len();
+/// Reads a drawing and prints its diagnostics. With `--strict` a warning stops here.
+pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedDrawing, Failure> {
+    let options = import::Options { plotter: arguments.plotter.clone(), paper: arguments.paper.clone() };
+    let document = import::read(&input.bytes, &options).map_err(|error| Failure::Usage(error.into()))?;
+    terminal::diagnostics(input, &document.diagnostics, arguments.message_format);
+    let pages = document.pages.len();
     if arguments.page == 0 || arguments.page > pages {
-        let what = format!("{} has {pages} page{}, not page {}", input.name, plural(pages), arguments.page);
+        let have = report::counted(pages, "page");
+        let what = format!("{} has {have}, not page {}", input.name, arguments.page);
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }
-    let warned = reading.diagnostics.iter().any(|diagnostic| diagnostic.severity >= Severity::Warning);
-    if arguments.strict && warned {
+    if arguments.strict && document.has(Severity::Warning) {
         terminal::error(STRICT);
         return Err(Failure::Refused);
     }
-    Ok(Drawn { reading, page: arguments.page - 1 })
-}
-
-fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
-}
-
-fn unknown_plotter(plotter: &str, paper: Option<&str>) -> anyhow::Error {
-    let known = hpgl::plotters().iter().find(|known| known.name == plotter);
-    if let (Some(known), Some(paper)) = (known, paper) {
-        let papers: Vec<&str> = known.papers.iter().map(|paper| paper.name).collect();
-        return anyhow::anyhow!(
-            "the plotter {plotter} has no paper {paper}: there are {}",
-            papers.join(", ")
-        );
-    }
-    let names: Vec<&str> = hpgl::plotters().iter().map(|known| known.name).collect();
-    anyhow::anyhow!("there is no plotter {plotter}: there are {}", names.join(", "))
+    Ok(LoadedDrawing { document, page: arguments.page - 1 })
 }
 
 /// A machine with the file it came from.

@@ -4,9 +4,9 @@ use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use compiler::import::{Diagnostic, Severity};
 use compiler::pipeline::Step;
 use drawing::Span;
-use hpgl::{Diagnostic, Severity};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::MessageFormat;
@@ -63,15 +63,12 @@ pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: Mes
         if diagnostic.count > 1 {
             title = format!("{title} (and {} more like it)", diagnostic.count - 1);
         }
-        let place = format!(
-            "byte {}, command {}, pen at {:.2}, {:.2} mm",
-            diagnostic.span.start, diagnostic.command, diagnostic.pen_position.x, diagnostic.pen_position.y
-        );
+        let place = format!("byte {}, {}", diagnostic.span.start, diagnostic.place);
         at_place(
             input,
             diagnostic.span,
             level,
-            Some(&diagnostic.code.to_string()),
+            Some(diagnostic.code),
             &title,
             &place,
             diagnostic.help.as_deref(),
@@ -90,7 +87,7 @@ fn short(input: &Input, diagnostic: &Diagnostic) -> String {
 fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
     serde_json::json!({
         "file": input.name,
-        "code": diagnostic.code.to_string(),
+        "code": diagnostic.code,
         "severity": diagnostic.severity.to_string(),
         "message": diagnostic.message,
         "help": diagnostic.help,
@@ -98,7 +95,7 @@ fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
         "byte": diagnostic.span.start,
         "end": diagnostic.span.end,
         "command": diagnostic.command,
-        "pen_mm": [diagnostic.pen_position.x, diagnostic.pen_position.y],
+        "pen_mm": diagnostic.pen_mm,
     })
 }
 

@@ -1,10 +1,89 @@
-//! Importers: bytes in, drawing and diagnostics out.
+//! Importers: a file's bytes in, its drawing and diagnostics out.
+//!
+//! One file a format. [`read`] takes the first importer of [`IMPORTERS`] that recognizes the
+//! bytes; HP-GL has no signature and comes last. A new input format is one file here and one line
+//! in that list.
 
-pub mod points;
+mod document;
+mod hpgl;
+mod points;
 
 use std::fmt::Write as _;
 
 use sha2::Digest as _;
+
+pub use self::document::{Diagnostic, Document, Fact, Page, PenSettings, Severity};
+
+/// What a reader needs to know besides the bytes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Options {
+    /// The HP-GL plotter that the file was made for; found from the file if `None`.
+    pub plotter: Option<String>,
+    /// The paper loaded in that plotter; the plotter's first one if `None`.
+    pub paper: Option<String>,
+}
+
+/// Why a file is not read at all.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// No plotter has this name.
+    #[error("unknown plotter {name}; known: {}", known.join(", "))]
+    Plotter {
+        /// The name given.
+        name: String,
+        /// All names.
+        known: Vec<&'static str>,
+    },
+    /// The plotter does not take this paper.
+    #[error("plotter {plotter} has no paper {name}; it takes {}", known.join(", "))]
+    Paper {
+        /// The plotter's name.
+        plotter: String,
+        /// The paper given.
+        name: String,
+        /// All papers of that plotter.
+        known: Vec<&'static str>,
+    },
+}
+
+/// A reader of one format.
+#[derive(Clone, Copy, Debug)]
+pub struct Importer {
+    /// The format's name.
+    pub name: &'static str,
+    /// Whether the bytes, seen from their start, are in this format.
+    pub recognizes: fn(&[u8]) -> bool,
+    /// Reads them. Never fails: what cannot be read is reported in the document's diagnostics.
+    pub read: fn(&[u8], &Options) -> Result<Document, ImportError>,
+}
+
+/// All importers, in the order in which they are asked.
+pub const IMPORTERS: &[Importer] = &[points::IMPORTER, hpgl::IMPORTER];
+
+/// Reads a drawing of any recognized format.
+///
+/// # Errors
+/// Options that name an unknown plotter or paper.
+pub fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
+    let importer = IMPORTERS.iter().find(|importer| (importer.recognizes)(bytes));
+    (importer.unwrap_or(&hpgl::IMPORTER).read)(bytes, options)
+}
+
+/// The title, severity and explanation of a diagnostic's code, whichever importer reports it.
+pub fn explain(code: &str) -> Option<(String, &'static str)> {
+    hpgl::explain(code)
+}
+
+/// The known HP-GL plotters with their papers, one a line.
+pub fn plotters() -> String {
+    let mut text = String::new();
+    for plotter in ::hpgl::plotters() {
+        let papers: Vec<&str> = plotter.papers.iter().map(|paper| paper.name).collect();
+        let _ = writeln!(text, "{:<12} {}; papers: {}", plotter.name, plotter.title, papers.join(", "));
+    }
+    text
+}
 
 /// SHA-256 of a file's bytes, in lowercase hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {

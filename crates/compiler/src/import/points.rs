@@ -1,23 +1,42 @@
-//! Seed 4's drawings: text with points `<x, y>` in mm, such as Inkscape's POV-Ray export has; everything else is passed over.
+//! Text with points `<x, y>` in mm, such as Inkscape's POV-Ray export and the polar robot's program
+//! use (docs/references.md, report 4). Everything else in the file is skipped.
 //!
-//! All points are one stroke of pen 1; a point equal to the one before is left out. The robot's own program also leaves out
-//! the last point where it equals the first, and so the line that closes a figure: here it is drawn. The drawing's (0, 0)
-//! is the lower left corner of the robot's box, at -138 mm, 0 from its pivot, where the preset `polar` has its sheet.
+//! All points are one stroke of pen 1; a point equal to the one before it is left out. The robot's
+//! own program also leaves out the last point where it equals the first, and with it the line that
+//! closes a figure: here that line is drawn. The drawing's (0, 0) is the lower left corner of the
+//! robot's box, at -138 mm, 0 from its pivot, where the preset `polar` has its sheet.
 
 use drawing::{Drawing, Pen, Point, Span, Stroke};
 
-/// How far into a file its points have to begin.
+use super::{Document, Fact, Importer, Page};
+
+/// Recognized by a first byte that HP-GL does not begin with, and a point in the first 4 KiB.
+pub(super) const IMPORTER: Importer = Importer {
+    name: "points",
+    recognizes: looks_like_points,
+    read: |bytes, _| {
+        Ok(Document {
+            format: "points",
+            pages: vec![Page { drawing: read(bytes), ..Page::default() }],
+            diagnostics: Vec::new(),
+            size: format!("{} points", points(bytes).count()),
+            facts: vec![Fact { key: "dialect", value: "points <x, y>, mm".to_owned() }],
+        })
+    },
+};
+
+/// The first point begins within this many bytes.
 const HEAD_BYTES: usize = 4096;
 
-/// Whether these are the first bytes of such a file rather than of another drawing.
-pub fn looks_like_points(bytes: &[u8]) -> bool {
+/// Whether a file's first bytes are those of a list of points.
+fn looks_like_points(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(HEAD_BYTES)];
-    // No plotter's language begins so; POV-Ray's comments and directives do.
+    // POV-Ray's comments and directives begin with these bytes; no plotter language does.
     head.trim_ascii_start().first().is_some_and(|byte| b"</#".contains(byte)) && points(head).next().is_some()
 }
 
-/// Reads the points of a file: one stroke, or no ink where there are none.
-pub fn read(bytes: &[u8]) -> Drawing {
+/// The points of a file as one stroke; no stroke where there are no points.
+fn read(bytes: &[u8]) -> Drawing {
     let mut vertices: Vec<Point> = Vec::new();
     let mut span: Option<Span> = None;
     for (point, start, end) in points(bytes) {

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use compiler::import::Severity;
 use compiler::report::{counted, metres};
-use hpgl::Severity;
 use planner::placement;
 
 use crate::cli::Check;
@@ -14,12 +14,12 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
     let input = input::read(&arguments.file)?;
     let drawn = input::drawing(&input, &arguments.reading)?;
-    let reading = &drawn.reading;
+    let document = &drawn.document;
     let mut refused = false;
-    let mut text = format!("{}: {} commands\n", input.name, reading.summary.commands);
-    for (number, page) in reading.pages.iter().enumerate() {
+    let mut text = format!("{}: {}\n", input.name, document.size);
+    for (number, page) in document.pages.iter().enumerate() {
         let drawing = &page.drawing;
-        if reading.pages.len() > 1 {
+        if document.pages.len() > 1 {
             let _ = write!(text, "page {}: ", number + 1);
         }
         match drawing.bounding_box() {
@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
             None => text.push_str("no ink\n"),
         }
     }
-    if reading.pages.iter().all(|page| page.drawing.is_empty()) {
+    if document.pages.iter().all(|page| page.drawing.is_empty()) {
         terminal::error("the file draws nothing");
         refused = true;
     }
@@ -70,6 +70,6 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         }
     }
     output::write("-", |out| out.write_all(text.as_bytes()))?;
-    let loses_ink = reading.diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error);
+    let loses_ink = document.has(Severity::Error);
     if refused || loses_ink { Err(Failure::Refused) } else { Ok(()) }
 }

@@ -1,6 +1,7 @@
 //! `plotplan convert`: a drawing into a plan, or into a clean drawing.
 
 use annotate_snippets::Level;
+use compiler::import::{self, Page};
 use compiler::pipeline::{self, Compiled, Request};
 use compiler::report;
 use drawing::Drawing;
@@ -31,8 +32,8 @@ pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
         return Err(Failure::Drawing(anyhow::anyhow!(what)));
     }
     let drawn = input::drawing(&input, &arguments.reading)?;
-    if drawn.reading.pages.len() > 1 {
-        let (page, pages) = (arguments.reading.page, drawn.reading.pages.len());
+    if drawn.document.pages.len() > 1 {
+        let (page, pages) = (arguments.reading.page, drawn.document.pages.len());
         terminal::warning(&format!(
             "{} has {pages} pages; this is page {page}, --page takes another",
             input.name
@@ -54,12 +55,7 @@ fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> 
     })
 }
 
-fn plan(
-    arguments: &Convert,
-    input: &Input,
-    page: &hpgl::Page,
-    machine: &LoadedMachine,
-) -> Result<(), Failure> {
+fn plan(arguments: &Convert, input: &Input, page: &Page, machine: &LoadedMachine) -> Result<(), Failure> {
     let request = super::request(&arguments.planning, page, &machine.machine);
     let compiled = compile(input, &page.drawing, &machine.machine, &request)?;
     if compiled.beyond_sheet_mm > 1e-6 {
@@ -106,7 +102,7 @@ fn plan(
                 let document = plan::file::json::Document {
                     source: plan::file::json::Source {
                         name: input.name.clone(),
-                        sha256: compiler::import::sha256(&input.bytes),
+                        sha256: import::sha256(&input.bytes),
                     },
                     machine: serde_json::to_value(&machine.file)?,
                     settings: report::settings(&request),

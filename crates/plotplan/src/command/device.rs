@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use backends::device::{Device as Machine, Ebb, Faulty, Grbl, Ticks, XyPlotter};
-use compiler::pipeline;
 use drawing::{Point, Rect};
 use kinematics::MotorPos;
 use picture::{Ink, Scene};
@@ -170,7 +169,7 @@ fn scene(arguments: &Device, machine: Option<&LoadedMachine>, ink: &backends::In
         Some(bounds.map_or(here, |bounds| bounds.union(here)))
     });
     let sheet = machine.map(|machine| machine.machine.sheet()).or(bounds).unwrap_or(Rect::ZERO);
-    let reach = machine.map_or_else(Vec::new, |machine| pipeline::reach_outlines(&machine.machine));
+    let reach = machine.map_or_else(Vec::new, |machine| kinematics::reach_outlines(&machine.machine));
     let title = "what the machine drew".to_owned();
     Scene { title, sheet, reach, ink, travel: Vec::new(), start: None }
 }

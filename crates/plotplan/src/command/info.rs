@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use compiler::import::{Diagnostic, Fact};
 use compiler::report::{self, clock, counted, metres};
-use hpgl::{Code, Generation, Profile, ProfileReason, Wrappers};
 
 use crate::cli::Info;
 use crate::failure::Failure;
@@ -24,33 +24,17 @@ pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
     output::write("-", |out| out.write_all(text.as_bytes()))
 }
 
-/// What there is to say about a file of HP-GL, but for its drawing.
-fn language(input: &Input, reading: &hpgl::Document) -> String {
-    let wrappers = wrappers(reading.summary.wrappers);
-    let mut text = format!("dialect  {}{wrappers}\n", generation(reading.summary.generation()));
-    let producer =
-        hpgl::producer(&input.bytes).map_or("not known".into(), |name| format!("looks like {name}"));
-    let _ = writeln!(text, "producer {producer}");
-    text.push_str(&plotter(&reading.summary.profile));
-    let used = reading.summary.used.iter().map(|(mnemonic, count)| format!("{mnemonic} {count}"));
-    let _ = writeln!(text, "commands {}", reading.summary.commands);
-    let _ = writeln!(text, "used     {}", used.collect::<Vec<_>>().join(", "));
-    text
-}
-
 fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
     let drawn = input::drawing(input, &arguments.reading)?;
-    let reading = &drawn.reading;
+    let document = &drawn.document;
     let mut text = format!("drawing  {}\n", input.name);
-    if compiler::import::points::looks_like_points(&input.bytes) {
-        text.push_str("dialect  points <x, y>, mm\n");
-    } else {
-        text.push_str(&language(input, reading));
+    for Fact { key, value } in &document.facts {
+        let _ = writeln!(text, "{key:<8} {}", value.replace('\n', "\n         "));
     }
-    for (number, page) in reading.pages.iter().enumerate() {
+    for (number, page) in document.pages.iter().enumerate() {
         let drawing = &page.drawing;
-        if reading.pages.len() > 1 {
+        if document.pages.len() > 1 {
             let _ = writeln!(text, "page     {}", number + 1);
         }
         let Some(bounds) = drawing.bounding_box() else {
@@ -84,7 +68,7 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
             let _ = writeln!(text, "pen {:<4} {}, {}{own}", pen.0, counted(count, "stroke"), metres(length));
         }
     }
-    text.push_str(&told(&reading.diagnostics));
+    text.push_str(&findings(&document.diagnostics));
     if let Some(machine) = machine {
         let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
         let compiled = super::convert::compile(input, drawn.drawing(), &machine.machine, &request)?;
@@ -95,55 +79,16 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     Ok(text)
 }
 
-fn generation(generation: Generation) -> &'static str {
-    match generation {
-        Generation::HpGl => "HP-GL",
-        Generation::HpGl2 => "HP-GL/2",
-    }
-}
-
-/// What stands around the commands, as the end of a sentence.
-fn wrappers(found: Wrappers) -> String {
-    let names = [
-        (found.device_control, "device control"),
-        (found.pcl, "PCL or RTL"),
-        (found.job_control, "job control (PJL)"),
-    ];
-    let names: Vec<&str> =
-        names.into_iter().filter(|(is_there, _)| *is_there).map(|(_, name)| name).collect();
-    if names.is_empty() { String::new() } else { format!(", with {}", names.join(", ")) }
-}
-
-/// What plotter and paper the file was read for, and why.
-fn plotter(profile: &Profile) -> String {
-    let reason = match profile.reason {
-        ProfileReason::Assumed => "the file names none: HP 7475A with A4",
-        ProfileReason::Options => "as --plotter says",
-        ProfileReason::PaperCode => "HP 7475A: PS names the paper by its code",
-        ProfileReason::HpGl2 => {
-            "HP-GL/2 without the size of its page: HP 7475A with A4, scaling points in its corners"
-        }
-        ProfileReason::PageSize => "PS gives the size of the page",
-        ProfileReason::PictureFrame => "PCL gives the size of the picture frame",
-    };
-    let (p1, p2) = profile.scaling_points;
-    let clip = profile.hard_clip;
-    format!(
-        "plotter  {reason}; unit {} mm\n         reach {:.0}, {:.0} to {:.0}, {:.0}, scaling points {:.0}, {:.0} and {:.0}, {:.0}\n",
-        profile.unit_mm, clip.x0, clip.y0, clip.x1, clip.y1, p1.x, p1.y, p2.x, p2.y
-    )
-}
-
-/// What was passed over or interpreted, one line a kind.
-fn told(diagnostics: &[hpgl::Diagnostic]) -> String {
-    let mut counts: BTreeMap<Code, u64> = BTreeMap::new();
+/// What the reader reported, one line a code.
+fn findings(diagnostics: &[Diagnostic]) -> String {
+    let mut kinds: BTreeMap<&str, (&Diagnostic, u64)> = BTreeMap::new();
     for diagnostic in diagnostics {
-        *counts.entry(diagnostic.code).or_default() += diagnostic.count;
+        kinds.entry(diagnostic.code).or_insert((diagnostic, 0)).1 += diagnostic.count;
     }
-    let line = |(code, count): (&Code, &u64)| {
-        format!("{:<8} {count} x {code} {}\n", code.severity().to_string(), code.title())
+    let line = |(code, (diagnostic, count)): (&&str, &(&Diagnostic, u64))| {
+        format!("{:<8} {count} x {code} {}\n", diagnostic.severity.to_string(), diagnostic.title)
     };
-    counts.iter().map(line).collect()
+    kinds.iter().map(line).collect()
 }
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {

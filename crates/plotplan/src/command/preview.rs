@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use compiler::pipeline;
 use drawing::{Drawing, Point, Rect};
 use picture::{Ink, Scene};
 
@@ -57,7 +56,7 @@ fn of_drawing(input: &Input, arguments: &Preview) -> Result<Scene, Failure> {
     drawing.transform(map);
     let start = machine.geometry().forward(&machine.start());
     let title = format!("{} on {}", input.name, machine.name());
-    Ok(scene(&title, machine.sheet(), pipeline::reach_outlines(machine), &drawing, Some(start)))
+    Ok(scene(&title, machine.sheet(), kinematics::reach_outlines(machine), &drawing, Some(start)))
 }
 
 fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, start: Option<Point>) -> Scene {
@@ -89,7 +88,7 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
     Ok(Scene {
         title,
         sheet: machine.sheet(),
-        reach: pipeline::reach_outlines(machine),
+        reach: kinematics::reach_outlines(machine),
         ink,
         travel,
         start: Some(start),
