@@ -167,15 +167,15 @@ impl Program<'_> {
         if let Segment::Arc(arc) = segment
             && let Some(radius) = arc.circle_radius().filter(|radius| *radius < LARGEST_RADIUS_MM)
         {
-            let parts = (arc.sweep.abs() / MOST_TURN).ceil().max(1.0);
+            let parts = (arc.sweep_rad.abs() / MOST_TURN).ceil().max(1.0);
             // Mirrored, the half-diameters turn the other way.
-            let clockwise = arc.a.cross(arc.b) * arc.sweep < 0.0;
+            let clockwise = arc.a.cross(arc.b) * arc.sweep_rad < 0.0;
             for part in 1..=parts as u64 {
                 let to = arc.eval(part as f64 / parts);
                 if same(self.here, to) {
                     continue;
                 }
-                self.arc(arc, to, clockwise, radius * arc.sweep.abs() / parts, mm_s);
+                self.arc(arc, to, clockwise, radius * arc.sweep_rad.abs() / parts, mm_s);
             }
             return;
         }

@@ -202,7 +202,7 @@ fn pieces_of(drawing: &Drawing) -> Vec<(u16, [[i64; 2]; 3])> {
         }
         for (ends, segment) in stroke.vertices().windows(2).zip(stroke.segments()) {
             if let Segment::Arc(arc) = segment
-                && (arc.sweep.abs() - std::f64::consts::TAU).abs() < 1e-9
+                && (arc.sweep_rad.abs() - std::f64::consts::TAU).abs() < 1e-9
             {
                 // A whole turn may begin anywhere.
                 add(arc.center + arc.a, arc.center - arc.a, arc.center + arc.b);

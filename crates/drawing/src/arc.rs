@@ -19,15 +19,21 @@ pub struct EllipticArc {
     /// Half-diameter reached at `u = pi/2`, mm.
     pub b: Vec2,
     /// Parameter of the first point, rad.
-    pub start: f64,
+    pub start_rad: f64,
     /// Signed range of the parameter, rad; a whole turn is `2 pi` in size.
-    pub sweep: f64,
+    pub sweep_rad: f64,
 }
 
 impl EllipticArc {
     /// The circular arc about `center` with `radius` (mm) from angle `start` over `sweep` (rad, counterclockwise positive).
     pub fn circular(center: Point, radius: f64, start: f64, sweep: f64) -> Self {
-        Self { center, a: Vec2::new(radius, 0.0), b: Vec2::new(0.0, radius), start, sweep }
+        Self {
+            center,
+            a: Vec2::new(radius, 0.0),
+            b: Vec2::new(0.0, radius),
+            start_rad: start,
+            sweep_rad: sweep,
+        }
     }
 
     /// The point at parameter `u` (rad).
@@ -38,13 +44,16 @@ impl EllipticArc {
 
     /// The point at `t`, 0 at the start and 1 at the end.
     pub fn eval(&self, t: f64) -> Point {
-        self.at_angle(self.start + self.sweep * t)
+        self.at_angle(self.start_rad + self.sweep_rad * t)
     }
 
     /// First and second derivative by `t`, mm.
     pub fn derivatives(&self, t: f64) -> (Vec2, Vec2) {
-        let (sin, cos) = libm::sincos(self.start + self.sweep * t);
-        (self.sweep * (cos * self.b - sin * self.a), -self.sweep * self.sweep * (cos * self.a + sin * self.b))
+        let (sin, cos) = libm::sincos(self.start_rad + self.sweep_rad * t);
+        (
+            self.sweep_rad * (cos * self.b - sin * self.a),
+            -self.sweep_rad * self.sweep_rad * (cos * self.a + sin * self.b),
+        )
     }
 
     /// Radius in mm if this is an arc of a circle (to a relative 1e-12), otherwise nothing.
@@ -75,12 +84,16 @@ impl EllipticArc {
 
     /// The same points in the opposite order.
     pub fn reversed(&self) -> Self {
-        Self { start: self.start + self.sweep, sweep: -self.sweep, ..*self }
+        Self { start_rad: self.start_rad + self.sweep_rad, sweep_rad: -self.sweep_rad, ..*self }
     }
 
     /// The part between `t0` and `t1`.
     pub fn part(&self, t0: f64, t1: f64) -> Self {
-        Self { start: self.start + self.sweep * t0, sweep: self.sweep * (t1 - t0), ..*self }
+        Self {
+            start_rad: self.start_rad + self.sweep_rad * t0,
+            sweep_rad: self.sweep_rad * (t1 - t0),
+            ..*self
+        }
     }
 
     /// Into how many equal steps of `t` the arc must be cut so that every chord stays within `tolerance` mm of its arc.
@@ -97,7 +110,7 @@ impl EllipticArc {
         } else {
             2.0 * std::f64::consts::FRAC_PI_3
         };
-        let count = (self.sweep.abs() / largest).ceil();
+        let count = (self.sweep_rad.abs() / largest).ceil();
         if count.is_finite() && count >= 1.0 { count as usize } else { 1 }
     }
 }

@@ -67,11 +67,11 @@ fn crossings(segment: &Segment, axis: usize, edge: f64, cuts: &mut Vec<f64>) {
             let (a, b) = (of(arc.a.to_point()), of(arc.b.to_point()));
             let r = libm::hypot(a, b);
             let cosine = (edge - of(arc.center)) / r;
-            if cosine.abs() <= 1.0 && arc.sweep != 0.0 {
+            if cosine.abs() <= 1.0 && arc.sweep_rad != 0.0 {
                 let (phi, half) = (libm::atan2(b, a), libm::acos(cosine));
                 for base in [phi - half, phi + half] {
                     for u in angles_within(arc, base, std::f64::consts::TAU) {
-                        add((u - arc.start) / arc.sweep);
+                        add((u - arc.start_rad) / arc.sweep_rad);
                     }
                 }
             }

@@ -66,7 +66,7 @@ impl Segment {
         match self {
             Self::Line(_) => Vec2::ZERO,
             // a cos u + b sin u turned on by half a turn twice over: -sweep² of the first derivative.
-            Self::Arc(arc) => -arc.sweep * arc.sweep * arc.derivatives(t).0,
+            Self::Arc(arc) => -arc.sweep_rad * arc.sweep_rad * arc.derivatives(t).0,
             Self::Cubic(c) => 6.0 * ((c.p3 - c.p0) - 3.0 * (c.p2 - c.p1)),
         }
     }
@@ -103,7 +103,7 @@ impl Segment {
         match self {
             Self::Line(line) => libm::hypot(line.p1.x - line.p0.x, line.p1.y - line.p0.y),
             Self::Arc(arc) => match arc.circle_radius() {
-                Some(radius) => radius * arc.sweep.abs(),
+                Some(radius) => radius * arc.sweep_rad.abs(),
                 None => elliptic_length(arc),
             },
             Self::Cubic(cubic) => cubic.arclen(1e-6),
@@ -159,8 +159,11 @@ impl Segment {
 
 /// The angles `base + k * every` inside the arc's range of the parameter.
 pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64> {
-    let (low, high) =
-        if arc.sweep < 0.0 { (arc.start + arc.sweep, arc.start) } else { (arc.start, arc.start + arc.sweep) };
+    let (low, high) = if arc.sweep_rad < 0.0 {
+        (arc.start_rad + arc.sweep_rad, arc.start_rad)
+    } else {
+        (arc.start_rad, arc.start_rad + arc.sweep_rad)
+    };
     let first = ((low - base) / every).ceil();
     let last = ((high - base) / every).floor();
     if last < first || (last - first).is_nan() {
@@ -177,7 +180,7 @@ pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64
 /// step would have to be as fine as the ellipse is flat, bisection gets there in as many steps as it has digits.
 fn elliptic_length(arc: &EllipticArc) -> f64 {
     let speed = |t: f64| arc.derivatives(t).0.hypot2().sqrt();
-    let quarters = (arc.sweep.abs() / std::f64::consts::FRAC_PI_2).ceil().clamp(1.0, 4096.0) as usize;
+    let quarters = (arc.sweep_rad.abs() / std::f64::consts::FRAC_PI_2).ceil().clamp(1.0, 4096.0) as usize;
     let mut length = 0.0;
     // Intervals still to do, each with its values at start, middle and end, and how often it was halved.
     let mut open: Vec<([f64; 2], [f64; 3], u32)> = Vec::new();

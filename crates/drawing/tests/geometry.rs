@@ -15,7 +15,13 @@ fn segment() -> impl Strategy<Value = Segment> {
         (point(), 0.01..150.0f64, -7.0..7.0f64, -6.2..6.2f64)
             .prop_map(|(c, r, s, w)| Segment::Arc(EllipticArc::circular(c, r, s, w))),
         (point(), point(), point(), -7.0..7.0f64, -6.2..6.2f64).prop_map(|(c, a, b, s, w)| {
-            Segment::Arc(EllipticArc { center: c, a: a.to_vec2(), b: b.to_vec2(), start: s, sweep: w })
+            Segment::Arc(EllipticArc {
+                center: c,
+                a: a.to_vec2(),
+                b: b.to_vec2(),
+                start_rad: s,
+                sweep_rad: w,
+            })
         }),
         (point(), point(), point(), point())
             .prop_map(|(a, b, c, d)| Segment::Cubic(CubicBez::new(a, b, c, d))),
@@ -173,8 +179,8 @@ fn the_length_of_a_flat_ellipse_is_exact_too() {
         center: Point::ZERO,
         a: Vec2::new(146.301_685_362_793_85, 149.415_614_786_869_18),
         b: Vec2::new(189.228_143_314_783_84, 190.361_240_409_773_9),
-        start: 1.838_120_244_464_899_9,
-        sweep: 4.370_669_527_526_015,
+        start_rad: 1.838_120_244_464_899_9,
+        sweep_rad: 4.370_669_527_526_015,
     };
     let n = 2_000_000;
     let at = |k: i32| arc.eval(f64::from(k) / f64::from(n));
@@ -184,8 +190,8 @@ fn the_length_of_a_flat_ellipse_is_exact_too() {
     let flat = EllipticArc {
         a: Vec2::new(3.0, 4.0),
         b: Vec2::ZERO,
-        start: 0.3,
-        sweep: std::f64::consts::TAU,
+        start_rad: 0.3,
+        sweep_rad: std::f64::consts::TAU,
         ..arc
     };
     assert!((Segment::Arc(flat).length() - 20.0).abs() < 1e-6);

@@ -35,8 +35,8 @@ pub(crate) fn turn_circles(
             }
         }
         if best.1 > 0 {
-            let start = arc.start + f64::from(best.1) / f64::from(PLACES) * arc.sweep;
-            let arc = EllipticArc { start, ..arc };
+            let start = arc.start_rad + f64::from(best.1) / f64::from(PLACES) * arc.sweep_rad;
+            let arc = EllipticArc { start_rad: start, ..arc };
             let mut stroke = Stroke::new(strokes[at].pen, arc.eval(0.0), strokes[at].source());
             stroke.arc(arc);
             strokes[at] = stroke;
@@ -50,7 +50,7 @@ pub(crate) fn turn_circles(
 fn whole_turn(stroke: &Stroke) -> Option<EllipticArc> {
     let mut segments = stroke.segments();
     let (Some(Segment::Arc(arc)), None) = (segments.next(), segments.next()) else { return None };
-    ((arc.sweep.abs() - std::f64::consts::TAU).abs() < 1e-9).then_some(arc)
+    ((arc.sweep_rad.abs() - std::f64::consts::TAU).abs() < 1e-9).then_some(arc)
 }
 
 /// Lets each closed stroke begin at the vertex that is the cheapest between its neighbours; whether any has changed.

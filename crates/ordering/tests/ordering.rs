@@ -59,7 +59,7 @@ prop_compose! {
         let mut stroke = Stroke::polyline(Pen(pen), points, Span { start: at, end: at + 1 }).expect("points");
         if let Some(sweep) = arc {
             let center = stroke.end() - Vec2::new(1.0, 0.0);
-            stroke.arc(EllipticArc { center, a: Vec2::new(1.0, 0.0), b: Vec2::new(0.0, 1.0), start: 0.0, sweep });
+            stroke.arc(EllipticArc { center, a: Vec2::new(1.0, 0.0), b: Vec2::new(0.0, 1.0), start_rad: 0.0, sweep_rad: sweep });
         }
         stroke
     }
@@ -268,7 +268,7 @@ fn joined_ends_need_not_be_equal_to_the_last_bit_and_arcs_stay_arcs() {
     let mut arc = Stroke::new(Pen(1), Point::new(2.0, 0.0), Span { start: 10, end: 20 });
     let quarter = std::f64::consts::FRAC_PI_2;
     let (a, b) = (Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0));
-    arc.arc(EllipticArc { center: Point::new(1.0, 0.0), a, b, start: 0.0, sweep: quarter });
+    arc.arc(EllipticArc { center: Point::new(1.0, 0.0), a, b, start_rad: 0.0, sweep_rad: quarter });
     let line = stroke(1, &[(1.0, 1.0 + 3e-8), (0.0, 1.0)]);
     let far = stroke(1, &[(0.0, 1.0 + 1e-5), (0.0, 5.0)]);
     let (ordered, report) = order(vec![line, arc, far], &Options::default());
@@ -321,6 +321,9 @@ fn circles_begin_where_that_is_cheapest() {
     assert!((report.travel_mm_after - 180.0).abs() < 1e-6, "{}", report.travel_mm_after);
     let segments: Vec<Segment> = ordered[0].segments().collect();
     let [Segment::Arc(turned)] = segments[..] else { panic!("{segments:?}") };
-    assert_eq!((turned.center, turned.a, turned.b, turned.sweep), (arc.center, arc.a, arc.b, arc.sweep));
+    assert_eq!(
+        (turned.center, turned.a, turned.b, turned.sweep_rad),
+        (arc.center, arc.a, arc.b, arc.sweep_rad)
+    );
     assert_eq!(ordered[0].source(), Span { start: 7, end: 9 });
 }

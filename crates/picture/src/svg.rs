@@ -115,9 +115,12 @@ fn path<W: Write + ?Sized>(text: &mut Text<'_, W>, stroke: &Stroke) -> io::Resul
 fn write_arc<W: Write + ?Sized>(text: &mut Text<'_, W>, arc: &EllipticArc) -> io::Result<()> {
     let (longest, shortest) = arc.semi_axes();
     // Whole turns beyond the first two pieces' worth draw nothing new; the last point stays what it is.
-    let sweep =
-        if arc.sweep.abs() > 2.0 * TAU { arc.sweep % TAU + TAU.copysign(arc.sweep) } else { arc.sweep };
-    let arc = EllipticArc { sweep, ..*arc };
+    let sweep = if arc.sweep_rad.abs() > 2.0 * TAU {
+        arc.sweep_rad % TAU + TAU.copysign(arc.sweep_rad)
+    } else {
+        arc.sweep_rad
+    };
+    let arc = EllipticArc { sweep_rad: sweep, ..*arc };
     if !(shortest >= FLAT_TOLERANCE_MM && longest.is_finite()) {
         let mut points = Vec::new();
         Segment::Arc(arc).flatten(FLAT_TOLERANCE_MM, |point| points.push(point));

@@ -226,7 +226,7 @@ struct Lifter<'a> {
 fn first_cells(piece: &Piece) -> usize {
     match &piece.curve {
         Segment::Line(_) => 1,
-        Segment::Arc(arc) => (arc.sweep.abs() / 0.2).ceil().clamp(2.0, 1e6) as usize,
+        Segment::Arc(arc) => (arc.sweep_rad.abs() / 0.2).ceil().clamp(2.0, 1e6) as usize,
         Segment::Cubic(cubic) => {
             // The angle between the end tangents tells how much a blend turns; other cubics may wave between.
             let (u, v) = (cubic.p1 - cubic.p0, cubic.p3 - cubic.p2);

@@ -496,8 +496,8 @@ fn acceleration_is_held_between_the_places_of_a_jerk_limited_cell() {
         center: Point::new(0.5748581417638099, 0.15942215694678485),
         a: drawing::Vec2::new(0.2356550461267668, 0.0),
         b: drawing::Vec2::new(0.0, 0.09426201845070672),
-        start: -2.47424881794882,
-        sweep: -5.537629441915333,
+        start_rad: -2.47424881794882,
+        sweep_rad: -5.537629441915333,
     };
     let mut round = Stroke::new(Pen(2), arc.eval(0.0), Span::default());
     round.arc(arc);

@@ -43,8 +43,8 @@ fn arc(center: Point, from: Point, sweep: f64, chord: Option<f64>) -> Vec<Segmen
             center,
             a: radius,
             b: Vec2::new(-radius.y, radius.x),
-            start: 0.0,
-            sweep: sweep.to_radians(),
+            start_rad: 0.0,
+            sweep_rad: sweep.to_radians(),
         })],
         Some(chord) => {
             let count = (sweep.abs() / chord).ceil().max(1.0) as usize;

@@ -205,8 +205,8 @@ mod tests {
             center: Point::ZERO,
             a: Vec2::new(4.0, 0.0),
             b: Vec2::ZERO,
-            start: 0.0,
-            sweep: std::f64::consts::TAU,
+            start_rad: 0.0,
+            sweep_rad: std::f64::consts::TAU,
         });
         let sections = sections(&stroke, &EXACT);
         assert_eq!(sections.len(), 2);
