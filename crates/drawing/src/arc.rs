@@ -4,36 +4,32 @@ use kurbo::{Affine, Point, Vec2};
 
 use crate::segment::apply_linear;
 
-/// An arc of an ellipse: `p(u) = center + cos(u) * a + sin(u) * b`, `u` from `start` to `start + sweep`.
+/// An arc of an ellipse: `p(u) = center + cos(u) a + sin(u) b`, with `u` from `start_rad` to
+/// `start_rad + sweep_rad`.
 ///
-/// `a` and `b` are a pair of conjugate half-diameters in mm: perpendicular and equally long for a circle. This form
-/// is closed under every affine map, mirrored and sheared ones included (the map is applied to `center`, `a` and
-/// `b`), where the usual form by radii and rotation needs a singular value decomposition and loses its start angle.
-/// A degenerate ellipse (parallel `a` and `b`) is a stretch of a line, gone to and fro; it is legal.
+/// `a` and `b` are conjugate half-diameters in mm: perpendicular and of equal length for a circle.
+/// This form is closed under every affine map, including mirroring and shear: the map applies to
+/// `center`, `a` and `b`. The usual form (radii and rotation) needs a singular value decomposition
+/// and loses the start angle. A degenerate ellipse (`a` parallel to `b`) is a segment traversed
+/// back and forth; this is allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EllipticArc {
     /// Centre, mm.
     pub center: Point,
-    /// Half-diameter reached at `u = 0`, mm.
+    /// Half-diameter to the point at `u = 0`, mm.
     pub a: Vec2,
-    /// Half-diameter reached at `u = pi/2`, mm.
+    /// Half-diameter to the point at `u = pi/2`, mm.
     pub b: Vec2,
     /// Parameter of the first point, rad.
     pub start_rad: f64,
-    /// Signed range of the parameter, rad; a whole turn is `2 pi` in size.
+    /// Signed range of the parameter, rad; `2 pi` or `-2 pi` for a full ellipse.
     pub sweep_rad: f64,
 }
 
 impl EllipticArc {
-    /// The circular arc about `center` with `radius` (mm) from angle `start` over `sweep` (rad, counterclockwise positive).
-    pub fn circular(center: Point, radius: f64, start: f64, sweep: f64) -> Self {
-        Self {
-            center,
-            a: Vec2::new(radius, 0.0),
-            b: Vec2::new(0.0, radius),
-            start_rad: start,
-            sweep_rad: sweep,
-        }
+    /// A circular arc about `center`, counterclockwise for a positive sweep.
+    pub fn circular(center: Point, radius_mm: f64, start_rad: f64, sweep_rad: f64) -> Self {
+        Self { center, a: Vec2::new(radius_mm, 0.0), b: Vec2::new(0.0, radius_mm), start_rad, sweep_rad }
     }
 
     /// The point at parameter `u` (rad).
@@ -47,7 +43,7 @@ impl EllipticArc {
         self.at_angle(self.start_rad + self.sweep_rad * t)
     }
 
-    /// First and second derivative by `t`, mm.
+    /// First and second derivative with respect to `t`, mm.
     pub fn derivatives(&self, t: f64) -> (Vec2, Vec2) {
         let (sin, cos) = libm::sincos(self.start_rad + self.sweep_rad * t);
         (
@@ -56,14 +52,14 @@ impl EllipticArc {
         )
     }
 
-    /// Radius in mm if this is an arc of a circle (to a relative 1e-12), otherwise nothing.
+    /// The radius in mm if this is an arc of a circle (to a relative error of 1e-12), else `None`.
     pub fn circle_radius(&self) -> Option<f64> {
         let (aa, bb) = (self.a.hypot2(), self.b.hypot2());
         let scale = aa.max(bb);
         ((aa - bb).abs() <= 2e-12 * scale && self.a.dot(self.b).abs() <= 1e-12 * scale).then(|| aa.sqrt())
     }
 
-    /// Half the longest and half the shortest diameter, mm: the singular values of the matrix `[a b]`.
+    /// The semi-axes, longer one first, mm: the singular values of the matrix `[a b]`.
     pub fn semi_axes(&self) -> (f64, f64) {
         // sigma_1 +- sigma_2 = hypot of the two orthogonal combinations of the columns.
         let (a, b) = (self.a, self.b);
@@ -72,7 +68,7 @@ impl EllipticArc {
         (0.5 * (sum + difference), 0.5 * (sum - difference).abs())
     }
 
-    /// The same arc under an affine map.
+    /// The arc mapped by an affine map.
     pub fn transformed(&self, map: Affine) -> Self {
         Self {
             center: map * self.center,
@@ -82,12 +78,12 @@ impl EllipticArc {
         }
     }
 
-    /// The same points in the opposite order.
+    /// The same points in the opposite direction.
     pub fn reversed(&self) -> Self {
         Self { start_rad: self.start_rad + self.sweep_rad, sweep_rad: -self.sweep_rad, ..*self }
     }
 
-    /// The part between `t0` and `t1`.
+    /// The part from `t0` to `t1`.
     pub fn part(&self, t0: f64, t1: f64) -> Self {
         Self {
             start_rad: self.start_rad + self.sweep_rad * t0,
@@ -96,15 +92,15 @@ impl EllipticArc {
         }
     }
 
-    /// Into how many equal steps of `t` the arc must be cut so that every chord stays within `tolerance` mm of its arc.
+    /// The number of chords, equal in `t`, that keeps the chord error within `tolerance_mm`.
     ///
-    /// An ellipse is a unit circle under the matrix `[a b]`; a chord of angle `d` leaves the unit circle by
-    /// `1 - cos(d/2)`, and the matrix stretches that by the longest semi-axis `s` at the most. So
-    /// `d <= 2 acos(1 - tolerance / s)`.
-    pub fn chord_count(&self, tolerance: f64) -> usize {
+    /// An ellipse is the unit circle mapped by the matrix `[a b]`. A chord of angle `d` is
+    /// `1 - cos(d/2)` away from the unit circle, and the matrix scales that by the longer semi-axis
+    /// `s` at most. So `d <= 2 acos(1 - tolerance / s)`.
+    pub fn chord_count(&self, tolerance_mm: f64) -> usize {
         let (longest, _) = self.semi_axes();
-        let ratio = tolerance / longest;
-        // A chord never spans more than a third of a turn, so that a full circle keeps an inside.
+        let ratio = tolerance_mm / longest;
+        // At most 120 degrees a chord, so that a full circle keeps an area.
         let largest = if ratio < 1.0 {
             (2.0 * libm::acos(1.0 - ratio)).min(2.0 * std::f64::consts::FRAC_PI_3)
         } else {

@@ -1,13 +1,13 @@
-//! Clipping to an upright rectangle.
+//! Clipping to an axis-aligned rectangle.
 
 use kurbo::{Point, Rect};
 
 use crate::{Segment, segment::angles_within};
 
-/// The parts of `segment` inside `window` (its edge included), in order, as ranges of the parameter.
+/// The parts of `segment` inside `window`, in order, as ranges of the parameter.
 ///
-/// Lines, arcs and cubics are cut exactly at the window's edges and stay what they are. A window without area (or
-/// turned inside out) holds nothing.
+/// The window's edges count as inside. Lines, arcs and cubics are cut exactly at the edges and keep
+/// their type. A window without area, or with negative width or height, contains nothing.
 pub fn clip_segment(segment: &Segment, window: Rect) -> Vec<(f64, f64)> {
     if !(window.x1 > window.x0 && window.y1 > window.y0) {
         return Vec::new();
@@ -39,7 +39,7 @@ pub fn clip_segment(segment: &Segment, window: Rect) -> Vec<(f64, f64)> {
 }
 
 fn inside(p: Point, window: Rect) -> bool {
-    // The middle of a part along an edge may fall beside it by a rounding error.
+    // The middle of a part that runs along an edge may be outside by a rounding error.
     let slack = 1e-9;
     p.x >= window.x0 - slack
         && p.x <= window.x1 + slack
@@ -47,7 +47,7 @@ fn inside(p: Point, window: Rect) -> bool {
         && p.y <= window.y1 + slack
 }
 
-/// Adds the parameters strictly inside (0, 1) where the coordinate `axis` of the segment equals `edge`.
+/// Adds the parameters in the open interval (0, 1) at which the coordinate `axis` equals `edge`.
 fn crossings(segment: &Segment, axis: usize, edge: f64, cuts: &mut Vec<f64>) {
     let of = |p: Point| if axis == 0 { p.x } else { p.y };
     let mut add = |t: f64| {

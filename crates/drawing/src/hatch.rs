@@ -18,7 +18,8 @@ pub enum FillRule {
 }
 
 impl FillRule {
-    /// Whether a point of that winding number (or number of crossings, for [`Self::EvenOdd`]) is inside.
+    /// Whether a point of that winding number (or number of crossings, for [`Self::EvenOdd`]) is
+    /// inside.
     pub fn is_inside(self, winding: i32) -> bool {
         match self {
             Self::NonZero => winding != 0,
@@ -50,15 +51,18 @@ pub struct HatchGrid {
 }
 
 impl HatchGrid {
-    /// The parts of the lines inside closed outlines, line by line, the parts of every odd line in reverse order, so
-    /// that a pen goes to and fro (it still has to draw odd lines from `to` to `from`).
+    /// The parts of the lines inside closed outlines, line by line, the parts of every odd line in
+    /// reverse order, so that a pen goes to and fro (it still has to draw odd lines from `to` to
+    /// `from`).
     ///
-    /// `outlines` are the pieces of all outlines; the pieces of each must form a closed path. Curves are flattened to
-    /// 0.005 mm. Every crossing of a line takes one from `pieces_left`; `None` if there are more crossings than that.
+    /// `outlines` are the pieces of all outlines; the pieces of each must form a closed path.
+    /// Curves are flattened to 0.005 mm. Every crossing of a line takes one from `pieces_left`;
+    /// `None` if there are more crossings than that.
     ///
-    /// In coordinates along and across the lines, with the spacing as unit across, line `k` is crossed by an edge where
-    /// one end lies below `k` and the other does not (so that corners count once). Sorted along the line, the
-    /// crossings separate inside from outside by their parity or by the sum of their directions.
+    /// In coordinates along and across the lines, with the spacing as unit across, line `k` is
+    /// crossed by an edge where one end lies below `k` and the other does not (so that corners
+    /// count once). Sorted along the line, the crossings separate inside from outside by their
+    /// parity or by the sum of their directions.
     pub fn lines<'a>(
         self,
         outlines: impl IntoIterator<Item = &'a Segment>,

@@ -1,41 +1,43 @@
-//! Polylines on a lattice, in few bytes.
+//! Compact storage of polylines on a lattice.
 //!
-//! Plotters count in whole units, so that nearly every point of nearly every drawing is a multiple of one length, and the next
-//! point is near. Such a polyline is kept as its first point and steps of one or two bytes a coordinate: 2 to 4 bytes a vertex
-//! where two `f64` take 16. Nothing is lost: a polyline whose points do not come back bit by bit is not kept this way.
+//! Plotters use integer units, so most points are multiples of one length and close to their
+//! predecessor. Such a polyline is stored as its first point and differences of one or two bytes a
+//! coordinate: 2 to 4 bytes a vertex instead of 16. The encoding is lossless: a polyline whose
+//! points would not be restored bit for bit is not stored this way.
 
 use kurbo::Point;
 use std::num::NonZeroU32;
 
-/// The spacing of a lattice: a whole number of picometres up to 4.29 mm.
+/// The spacing of a lattice: an integer number of picometres, up to 4.29 mm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pitch(NonZeroU32);
 
 const PICOMETRES_A_MM: f64 = 1e9;
 
 impl Pitch {
-    /// The spacing of that many mm; nothing if it is not a whole number of picometres, or none up to 2^32.
+    /// The spacing in mm; `None` unless it is an integer number of picometres from 1 to 2^32 - 1.
     pub fn from_mm(mm: f64) -> Option<Self> {
         let pitch = Self(NonZeroU32::new((mm * PICOMETRES_A_MM).round() as u32)?);
         (pitch.mm() == mm).then_some(pitch)
     }
 
-    /// The spacing, mm. Both numbers are whole, so that the quotient is the f64 nearest to the decimal number.
+    /// The spacing, mm. Both operands are integers, so the quotient is the `f64` nearest to the
+    /// decimal number.
     fn mm(self) -> f64 {
         f64::from(self.0.get()) / PICOMETRES_A_MM
     }
 }
 
-/// Adding this leaves a number rounded to a whole one (ties to even) in the lowest bits of the sum: 1.5 * 2^52.
+/// 1.5 * 2^52: the low bits of `x + ROUND` are `x` rounded to an integer, ties to even.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// The lattice's point nearest to a coordinate; anything for one that is not within 2^31 steps.
+/// The lattice index nearest to a coordinate; unspecified beyond 2^31 steps.
 #[inline]
 fn nearest(coordinate: f64, per_mm: f64) -> i32 {
     (coordinate * per_mm + ROUND).to_bits() as i32
 }
 
-/// What the bytes of [`Steps`] are: bytes of a coordinate's step, the pitch, the first point, then the steps.
+/// Layout of [`Steps`]: bytes a coordinate difference, pitch, first point, differences.
 const PITCH: usize = 1;
 const START: usize = PITCH + 4;
 const STEPS: usize = START + 8;
@@ -47,19 +49,21 @@ pub(crate) struct Pair {
     ends: [[i32; 2]; 2],
 }
 
-/// Any number of points on a lattice. The pitch is among the bytes: beside them it would make every stroke larger.
+/// Points on a lattice. The pitch is part of the bytes: a field of its own would make every stroke
+/// larger.
 #[derive(Clone, Debug)]
 pub(crate) struct Steps {
     code: Box<[u8]>,
 }
 
-/// Points in whichever form they fit.
+/// The smallest encoding of a polyline.
 pub(crate) enum Encoding {
     Pair(Pair),
     Steps(Steps),
 }
 
-/// The form in which the points lie on the lattice; nothing if they do not, or if a step is too long.
+/// Encodes a polyline; `None` without points, if a point is off the lattice, or if a difference
+/// needs more than two bytes (unless there are two points only).
 pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
     let (mm, per_mm) = (pitch.mm(), PICOMETRES_A_MM / f64::from(pitch.0.get()));
     let cell = |p: Point| [nearest(p.x, per_mm), nearest(p.y, per_mm)];
@@ -80,7 +84,8 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
     if points.len() == 2 {
         return Some(Encoding::Pair(Pair { pitch, ends: [first, at] }));
     }
-    // A difference that wraps around is not that of the points, but it leads from one to the other all the same.
+    // A difference that wraps around still leads from one point to the next, because decoding
+    // wraps around too.
     let width: u8 = match longest {
         0..=0x7f => 1,
         0x80..=0x7fff => 2,
@@ -106,7 +111,7 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
     Some(Encoding::Steps(Steps { code: code.into_boxed_slice() }))
 }
 
-/// A number with the bits that a step needs: its own, or those of its complement where it is negative.
+/// The magnitude bits of a difference: the number, or its complement if it is negative.
 fn size(step: i32) -> u32 {
     (step ^ (step >> 31)) as u32
 }
@@ -119,7 +124,7 @@ impl Pair {
 }
 
 impl Steps {
-    /// How many points there are.
+    /// The number of points.
     pub(crate) fn len(&self) -> usize {
         1 + (self.code.len() - STEPS) / self.bytes_a_step()
     }
@@ -151,7 +156,7 @@ impl Steps {
     }
 }
 
-/// The points of [`Steps`], one after the other.
+/// Iterator over the points of [`Steps`].
 #[derive(Clone, Debug)]
 pub(crate) struct Points<'a> {
     mm: f64,
@@ -202,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn points_come_back_bit_by_bit() {
+    fn lattice_points_are_restored_bit_for_bit() {
         for mm in [0.025, 0.024_88] {
             let pitch = Pitch::from_mm(mm).unwrap();
             for cells in [
@@ -221,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused() {
+    fn off_lattice_points_and_pitches_are_rejected() {
         let pitch = Pitch::from_mm(0.025).unwrap();
         assert!(fit(&[], pitch).is_none());
         assert!(back(&[Point::new(0.01, 0.0)], pitch).is_none());

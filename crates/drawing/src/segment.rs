@@ -1,13 +1,13 @@
-//! One piece of a stroke.
+//! Segments of strokes.
 
 use kurbo::{Affine, CubicBez, Line, ParamCurve, ParamCurveArclen, ParamCurveDeriv, Point, Rect, Vec2};
 
 use crate::EllipticArc;
 
-/// One piece of a stroke: a straight line, an arc of an ellipse, or a cubic Bézier curve; mm.
+/// A segment of a stroke: a line, an arc of an ellipse, or a cubic Bézier curve; mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Segment {
-    /// Straight from `p0` to `p1`.
+    /// A line from `p0` to `p1`.
     Line(Line),
     /// An arc of a circle or an ellipse.
     Arc(EllipticArc),
@@ -40,7 +40,7 @@ impl Segment {
         }
     }
 
-    /// Point at `t` from 0 to 1, mm.
+    /// The point at `t`, 0 at the start and 1 at the end, mm.
     pub fn eval(&self, t: f64) -> Point {
         match self {
             Self::Line(line) => line.eval(t),
@@ -49,7 +49,7 @@ impl Segment {
         }
     }
 
-    /// First and second derivative by `t`, mm.
+    /// First and second derivative with respect to `t`, mm.
     pub fn derivatives(&self, t: f64) -> (Vec2, Vec2) {
         match self {
             Self::Line(line) => (line.p1 - line.p0, Vec2::ZERO),
@@ -61,17 +61,17 @@ impl Segment {
         }
     }
 
-    /// Third derivative by the parameter at `t`, mm.
+    /// Third derivative with respect to `t`, mm.
     pub fn third_derivative(&self, t: f64) -> Vec2 {
         match self {
             Self::Line(_) => Vec2::ZERO,
-            // a cos u + b sin u turned on by half a turn twice over: -sweep² of the first derivative.
+            // The third derivative of a cos u + b sin u by u is minus the first one.
             Self::Arc(arc) => -arc.sweep_rad * arc.sweep_rad * arc.derivatives(t).0,
             Self::Cubic(c) => 6.0 * ((c.p3 - c.p0) - 3.0 * (c.p2 - c.p1)),
         }
     }
 
-    /// The part between `t0` and `t1`.
+    /// The part from `t0` to `t1`.
     pub fn part(&self, t0: f64, t1: f64) -> Self {
         match self {
             Self::Line(line) => Self::Line(line.subsegment(t0..t1)),
@@ -80,7 +80,7 @@ impl Segment {
         }
     }
 
-    /// The same points in the opposite order.
+    /// The same points in the opposite direction.
     pub fn reversed(&self) -> Self {
         match self {
             Self::Line(line) => Self::Line(Line::new(line.p1, line.p0)),
@@ -89,7 +89,7 @@ impl Segment {
         }
     }
 
-    /// The same piece under an affine map.
+    /// The segment mapped by an affine map.
     pub fn transformed(&self, map: Affine) -> Self {
         match self {
             Self::Line(line) => Self::Line(map * *line),
@@ -98,7 +98,7 @@ impl Segment {
         }
     }
 
-    /// Length in mm, to 1e-6 mm.
+    /// The length, mm; accurate to 1e-6 mm.
     pub fn length(&self) -> f64 {
         match self {
             Self::Line(line) => libm::hypot(line.p1.x - line.p0.x, line.p1.y - line.p0.y),
@@ -110,13 +110,13 @@ impl Segment {
         }
     }
 
-    /// The smallest upright rectangle that holds the piece, mm.
+    /// The bounding box, mm.
     pub fn bounding_box(&self) -> Rect {
         match self {
             Self::Line(line) => Rect::from_points(line.p0, line.p1),
             Self::Arc(arc) => {
                 let mut bounds = Rect::from_points(arc.eval(0.0), arc.eval(1.0));
-                // x is extreme where tan u = b.x / a.x, y likewise: two angles a turn each.
+                // x is extreme where tan u = b.x / a.x, and y likewise: two angles in 2 pi.
                 for (a, b) in [(arc.a.x, arc.b.x), (arc.a.y, arc.b.y)] {
                     let extreme = libm::atan2(b, a);
                     for u in angles_within(arc, extreme, std::f64::consts::PI) {
@@ -129,27 +129,29 @@ impl Segment {
         }
     }
 
-    /// Into how many equal steps of `t` the piece must be cut so that every chord stays within `tolerance` mm of it.
+    /// The number of chords, equal in `t`, that keeps the chord error within `tolerance_mm`.
     ///
-    /// Cubics: the chord of `f` over a step `h` of the parameter leaves it by `h^2/8 max|f''|` at the most, and the
-    /// second derivative of a cubic is largest at one of its ends. Arcs: [`EllipticArc::chord_count`].
-    pub fn chord_count(&self, tolerance: f64) -> usize {
+    /// Cubics: the chord of `f` over a step `h` has an error of `h²/8 max|f''|` at most, and the
+    /// second derivative of a cubic is largest at one of its ends. Arcs:
+    /// [`EllipticArc::chord_count`].
+    pub fn chord_count(&self, tolerance_mm: f64) -> usize {
         match self {
             Self::Line(_) => 1,
-            Self::Arc(arc) => arc.chord_count(tolerance),
+            Self::Arc(arc) => arc.chord_count(tolerance_mm),
             Self::Cubic(_) => {
                 let (_, at_start) = self.derivatives(0.0);
                 let (_, at_end) = self.derivatives(1.0);
                 let largest = at_start.hypot2().max(at_end.hypot2()).sqrt();
-                let count = (largest / (8.0 * tolerance)).sqrt().ceil();
+                let count = (largest / (8.0 * tolerance_mm)).sqrt().ceil();
                 if count.is_finite() && count >= 1.0 { count as usize } else { 1 }
             }
         }
     }
 
-    /// Calls `to` with the ends of chords that stay within `tolerance` mm of the piece; the start is not repeated.
-    pub fn flatten(&self, tolerance: f64, mut to: impl FnMut(Point)) {
-        let count = self.chord_count(tolerance);
+    /// Calls `to` with the end of each chord of a flattening within `tolerance_mm`. The start of the
+    /// segment is not passed.
+    pub fn flatten(&self, tolerance_mm: f64, mut to: impl FnMut(Point)) {
+        let count = self.chord_count(tolerance_mm);
         for step in 1..count {
             to(self.eval(step as f64 / count as f64));
         }
@@ -157,7 +159,7 @@ impl Segment {
     }
 }
 
-/// The angles `base + k * every` inside the arc's range of the parameter.
+/// The angles `base + k * every` in the parameter range of the arc.
 pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64> {
     let (low, high) = if arc.sweep_rad < 0.0 {
         (arc.start_rad + arc.sweep_rad, arc.start_rad)
@@ -169,20 +171,22 @@ pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64
     if last < first || (last - first).is_nan() {
         return Vec::new();
     }
-    // More than a turn says nothing new.
+    // Two full ellipses are enough: further angles repeat the same points.
     let count = (last - first).min(2.0 * std::f64::consts::TAU / every) as usize + 1;
     (0..count).map(|k| base + (first + k as f64) * every).collect()
 }
 
-/// Length of an elliptic arc, to about 1e-7 mm for each quarter turn: adaptive Simpson quadrature of |p'(t)|.
+/// The length of an elliptic arc, to about 1e-7 mm a quarter turn: adaptive Simpson quadrature of
+/// `|p'(t)|`.
 ///
-/// The integrand is smooth but for flat ellipses, where it nearly has a kink at each end of the long axis: an even
-/// step would have to be as fine as the ellipse is flat, bisection gets there in as many steps as it has digits.
+/// The integrand is smooth, except that for flat ellipses it almost has a kink at each end of the
+/// long axis. A uniform step would have to be as small as the ellipse is flat; bisection needs one
+/// halving for each bit of that ratio.
 fn elliptic_length(arc: &EllipticArc) -> f64 {
     let speed = |t: f64| arc.derivatives(t).0.hypot2().sqrt();
     let quarters = (arc.sweep_rad.abs() / std::f64::consts::FRAC_PI_2).ceil().clamp(1.0, 4096.0) as usize;
     let mut length = 0.0;
-    // Intervals still to do, each with its values at start, middle and end, and how often it was halved.
+    // Open intervals: bounds, values at start, middle and end, number of halvings.
     let mut open: Vec<([f64; 2], [f64; 3], u32)> = Vec::new();
     for quarter in 0..quarters {
         let at = |k: usize| k as f64 / quarters as f64;
@@ -194,7 +198,7 @@ fn elliptic_length(arc: &EllipticArc) -> f64 {
         let (left, right) = (speed(0.5 * (t0 + middle)), speed(0.5 * (middle + t1)));
         let whole = (t1 - t0) / 6.0 * (f0 + 4.0 * f1 + f2);
         let halves = (t1 - t0) / 12.0 * (f0 + 4.0 * left + 2.0 * f1 + 4.0 * right + f2);
-        // The halves' error is a fifteenth of the difference.
+        // Richardson: the error of the halves is a fifteenth of the difference.
         if halvings >= 3 && (halves - whole).abs() <= 15.0 * 1e-9 || halvings >= 40 {
             length += halves + (halves - whole) / 15.0;
         } else {

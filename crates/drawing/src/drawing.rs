@@ -1,0 +1,44 @@
+//! Drawings.
+
+use std::collections::BTreeSet;
+
+use kurbo::{Affine, Rect};
+
+use crate::{Pen, Stroke};
+
+/// The ink on the paper: strokes in the order in which they are drawn; mm, y up.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drawing {
+    /// The strokes.
+    pub strokes: Vec<Stroke>,
+}
+
+impl Drawing {
+    /// Whether there are no strokes.
+    pub fn is_empty(&self) -> bool {
+        self.strokes.is_empty()
+    }
+
+    /// The bounding box of all strokes, mm; `None` for an empty drawing.
+    pub fn bounding_box(&self) -> Option<Rect> {
+        self.strokes.iter().map(Stroke::bounding_box).reduce(|bounds, other| bounds.union(other))
+    }
+
+    /// The length of all strokes, mm.
+    pub fn length(&self) -> f64 {
+        self.strokes.iter().fold(0.0, |sum, stroke| sum + stroke.length())
+    }
+
+    /// Applies an affine map to every stroke.
+    pub fn transform(&mut self, map: Affine) {
+        for stroke in &mut self.strokes {
+            stroke.transform(map);
+        }
+    }
+
+    /// The pens of its strokes, each once, in ascending order.
+    pub fn pens(&self) -> Vec<Pen> {
+        let pens: BTreeSet<Pen> = self.strokes.iter().map(|stroke| stroke.pen).collect();
+        pens.into_iter().collect()
+    }
+}
