@@ -1,15 +1,14 @@
-//! Strokes that other strokes draw already.
+//! Removal of duplicate strokes.
 
 use drawing::{Point, Segment, Stroke};
 
 use crate::touch::square;
 
-/// A piece as a set of points: its ends and what lies a quarter of the way from each, to the tolerance of touching,
-/// the same in either direction.
-type Piece = [[i64; 2]; 4];
+/// Key of a segment, equal in both directions: the grid squares of its points at t = 0, 1/4, 3/4, 1.
+type SegmentKey = [[i64; 2]; 4];
 
-fn piece(segment: &Segment) -> Piece {
-    // Half a square off, so that coordinates that are round numbers are nowhere near the edge of a square.
+fn segment_key(segment: &Segment) -> SegmentKey {
+    // Offset by half a square, so that round coordinates are far from the edge of a square.
     let at = |t| {
         let p = segment.eval(t);
         square(Point::new(p.x + 0.25e-6, p.y + 0.25e-6))
@@ -20,20 +19,20 @@ fn piece(segment: &Segment) -> Piece {
     forward.min(backward)
 }
 
-/// Removes strokes, all of one pen, all of whose pieces are pieces of others, later ones first; dots that lie on a
-/// vertex of a stroke or on another dot are such as well.
+/// Removes each stroke (all of one pen) whose segments are all drawn by other strokes, starting with
+/// the last stroke. A dot on a vertex of a stroke, or on another dot, is a duplicate too.
 pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
-    let mut pieces: Vec<(Piece, u32)> = Vec::new();
+    let mut keys: Vec<(SegmentKey, u32)> = Vec::new();
     for stroke in &strokes {
         for segment in stroke.segments() {
-            pieces.push((piece(&segment), pieces.len() as u32));
+            keys.push((segment_key(&segment), keys.len() as u32));
         }
     }
-    pieces.sort_unstable();
-    // How often each piece is drawn, by the number of the piece.
-    let mut number = vec![0; pieces.len()];
+    keys.sort_unstable();
+    // `number[i]` is the key number of segment `i`, `drawn[k]` the count of segments with key `k`.
+    let mut number = vec![0; keys.len()];
     let mut drawn: Vec<u32> = Vec::new();
-    for same in pieces.chunk_by(|a, b| a.0 == b.0) {
+    for same in keys.chunk_by(|a, b| a.0 == b.0) {
         for &(_, at) in same {
             number[at as usize] = drawn.len();
         }
@@ -58,13 +57,13 @@ pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
         }
         let own = &number[end - stroke.segment_count()..end];
         end -= own.len();
-        for &piece in own {
-            drawn[piece] -= 1;
+        for &key in own {
+            drawn[key] -= 1;
         }
-        keep[at] = own.iter().any(|&piece| drawn[piece] == 0);
+        keep[at] = own.iter().any(|&key| drawn[key] == 0);
         if keep[at] {
-            for &piece in own {
-                drawn[piece] += 1;
+            for &key in own {
+                drawn[key] += 1;
             }
         }
     }

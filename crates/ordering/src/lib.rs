@@ -1,12 +1,33 @@
-//! The order of strokes: merge, remove duplicates, reorder, reverse, by a cost that is handed in.
+//! Stroke ordering: merges, deduplicates, reorders and reverses strokes to reduce pen-up travel.
 //!
-//! [`optimize`] takes a drawing and gives back the same ink in an order, and in directions, that cost less to travel
-//! with the pen up. What a move costs is the caller's [`Cost`]: the time a machine needs, or millimetres. Candidates
-//! for the next stroke come from the plane, gains from the cost.
+//! [`optimize`] takes a drawing and returns the same ink in an order, and in directions, with less
+//! pen-up travel. The caller defines the [`Cost`] of a pen-up move: the time on a machine, or mm.
+//! Candidates for the next stroke are the nearest ones in the plane; gains are computed with the
+//! cost.
 //!
-//! Strokes keep to their pen: all strokes of one pen are drawn before the next pen is taken. The result depends on
-//! the arguments alone, to the last bit: effort is counted in moves, ties go to the lower index, and the only
-//! arithmetic is `+ - * /` and the square root.
+//! All strokes of a pen are drawn before the next pen. The result is deterministic to the last bit:
+//! effort is counted in moves, ties go to the lower index, and the only arithmetic is `+ - * /` and
+//! the square root.
+//!
+//! ```
+//! use drawing::{Drawing, Pen, Point, Span, Stroke};
+//! use ordering::{Options, optimize};
+//!
+//! let line = |x: f64| {
+//!     let ends = vec![Point::new(x, 0.0), Point::new(x, 10.0)];
+//!     Stroke::polyline(Pen(1), ends, Span::default()).expect("a polyline has points")
+//! };
+//! let drawing = Drawing { strokes: vec![line(0.0), line(20.0), line(10.0)] };
+//! // Two independent axes at 100 mm/s: a move takes as long as its longer component.
+//! let seconds = |a: Point, b: Point| f64::max((a.x - b.x).abs(), (a.y - b.y).abs()) / 100.0;
+//! let start = Some(Point::new(0.0, 0.0));
+//!
+//! let (ordered, report) = optimize(drawing, &seconds, &Options { start, ..Options::default() });
+//! assert_eq!(ordered.strokes.iter().map(|s| s.start().x).collect::<Vec<_>>(), [0.0, 10.0, 20.0]);
+//! // The lines are drawn up, down, up: two moves of 10 mm instead of one of 20 and one of 10 mm.
+//! assert!((report.travel_cost_before - 0.3).abs() < 1e-12);
+//! assert!((report.travel_cost_after - 0.2).abs() < 1e-12);
+//! ```
 
 mod dedupe;
 mod merge;
@@ -17,25 +38,27 @@ mod touch;
 
 use drawing::{Drawing, Pen, Point, Stroke};
 
+/// The distance in the plane, mm: the [`Cost`] without a machine.
+pub use drawing::distance;
 pub use report::Report;
 use search::{End, Problem};
 
-/// A point in the cost function's own terms: joints for a machine, the plane itself without one.
+/// A point in the space in which costs are computed: joint positions, or the plane itself.
 pub type CostPoint = [f64; 2];
 
-/// The cost of a pen-up move between two points, mm; in seconds for a machine, in millimetres without one.
+/// The cost of a pen-up move between two points in mm: in seconds on a machine, or in mm.
 ///
-/// It must be symmetric, not negative, and the same for the same points. Any function or closure of two points is a
-/// cost. The search asks for the same points many times: where finding out what a point means is dear (inverse
-/// kinematics), a cost says so once in `to_cost_space` and compares places.
+/// It must be symmetric, finite, not negative, and a pure function of its arguments. Any function
+/// or closure of two points is a cost. The search evaluates the same points many times: a cost that
+/// needs inverse kinematics does it once a point, in `to_cost_space`.
 pub trait Cost {
-    /// The point in the cost's own terms.
+    /// Maps a point of the plane to the space in which costs are computed.
     fn to_cost_space(&self, point: Point) -> CostPoint;
 
-    /// What the move from one place to another (or back) costs.
+    /// The cost of a move between two mapped points.
     fn between_cost_points(&self, a: CostPoint, b: CostPoint) -> f64;
 
-    /// What the move from `a` to `b` (or back) costs.
+    /// The cost of a move between two points of the plane.
     fn between(&self, a: Point, b: Point) -> f64 {
         self.between_cost_points(self.to_cost_space(a), self.to_cost_space(b))
     }
@@ -51,28 +74,23 @@ impl<F: Fn(Point, Point) -> f64 + Sync> Cost for F {
     }
 }
 
-/// The distance in the plane, mm: the [`Cost`] where there is no machine.
-pub fn distance(a: Point, b: Point) -> f64 {
-    let (dx, dy) = (a.x - b.x, a.y - b.y);
-    (dx * dx + dy * dy).sqrt()
-}
-
-/// What [`optimize`] may do, and how hard it tries.
+/// Options of [`optimize`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// 0: good starts improved until nothing gains. 1, 2 (the default), 3: then searched on, eight times as long each.
+    /// 0: local optimum from several starts. 1, 2 (default), 3: perturbation search after that, each
+    /// eight times as long as the one before.
     pub effort: u8,
-    /// Removes strokes all of whose pieces are drawn by other strokes of the same pen.
+    /// Removes strokes all of whose segments are drawn by other strokes of the same pen.
     pub dedupe: bool,
-    /// Joins strokes that touch at their ends (within 1e-6 mm) into the fewest possible.
+    /// Joins strokes whose ends touch (within 1e-6 mm) into the fewest possible strokes.
     pub merge: bool,
-    /// No stroke is drawn from its other end.
+    /// Never reverses a stroke.
     pub keep_direction: bool,
-    /// Where the pen is before the first stroke; the first stroke costs nothing to reach if nothing is said.
+    /// Pen position before the first stroke. If `None`, the first stroke costs nothing to reach.
     pub start: Option<Point>,
-    /// Where the pen goes after the last stroke; nowhere if nothing is said.
+    /// Pen position after the last stroke. If `None`, there is no move after it.
     pub park: Option<Point>,
-    /// The order of the pens. Pens not named come after those that are; without it, the file's order.
+    /// Pen order. Pens that are not listed follow in the order of their first stroke.
     pub pen_order: Option<Vec<Pen>>,
 }
 
@@ -90,11 +108,11 @@ impl Default for Options {
     }
 }
 
-/// Reorders the strokes of a drawing so that they cost less to travel between, and says what that brought.
+/// Reorders the strokes of a drawing to reduce pen-up travel, and reports the effect.
 ///
-/// All strokes of a pen come together, in the order in which the pens first appear, or in `pen_order`. The same
-/// pieces are drawn with the same pens, each forwards or backwards. The travel, by `cost`, is never dearer than that
-/// of the file's order with the pens put together.
+/// Strokes are grouped by pen, in `pen_order` or in the order of the pens' first strokes. The same
+/// segments are drawn with the same pens, each forwards or backwards. The cost of travel is never
+/// higher than in file order with the pens grouped. If the cost is not finite, file order is kept.
 pub fn optimize(drawing: Drawing, cost: &dyn Cost, options: &Options) -> (Drawing, Report) {
     let strokes_before = drawing.strokes.len();
     let (travel_cost_before, travel_mm_before) = report::travel(&drawing.strokes, cost, options);
@@ -111,7 +129,7 @@ pub fn optimize(drawing: Drawing, cost: &dyn Cost, options: &Options) -> (Drawin
 
     let (limit, _) = report::travel(&in_file_order, cost, options);
     let (found, _) = report::travel(&ordered, cost, options);
-    // A cost that is not a number is no reason to reorder anything, and a rounding error none not to.
+    // With NaN the comparison is false and file order is kept. A rounding error must not decide.
     let strokes = if found <= limit + 1e-9 * limit { ordered } else { in_file_order };
     let (travel_cost_after, travel_mm_after) = report::travel(&strokes, cost, options);
     let report = Report {
@@ -127,7 +145,7 @@ pub fn optimize(drawing: Drawing, cost: &dyn Cost, options: &Options) -> (Drawin
     (Drawing { strokes }, report)
 }
 
-/// The strokes of each pen in the file's order, the pens in the order they are asked for or first seen.
+/// The strokes of each pen in file order; pens as in `pen_order`, then by their first stroke.
 fn by_pen(strokes: Vec<Stroke>, pen_order: Option<&[Pen]>) -> Vec<Vec<Stroke>> {
     let mut pens = pen_order.unwrap_or_default().to_vec();
     let mut groups: Vec<Vec<Stroke>> = pens.iter().map(|_| Vec::new()).collect();
@@ -143,7 +161,7 @@ fn by_pen(strokes: Vec<Stroke>, pen_order: Option<&[Pen]>) -> Vec<Vec<Stroke>> {
     groups
 }
 
-/// Orders the strokes of each pen for itself, from where the pen before it ended.
+/// Orders the strokes of each pen separately, starting where the previous pen ended.
 fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -> Vec<Stroke> {
     let mut ordered: Vec<Stroke> = Vec::new();
     let last = pens.len().saturating_sub(1);
@@ -152,7 +170,7 @@ fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -
         let start = ordered.last().map_or(options.start, |stroke| Some(stroke.end()));
         let park = if at == last { options.park } else { None };
         let mut strokes = search(strokes, start, park, cost, options, (options.effort, all));
-        // Where closed strokes begin, they are reached elsewhere: another order may be better now.
+        // New start points of closed strokes may make another order better.
         let choose = |strokes: &mut [Stroke]| {
             let turned = seam::turn_circles(strokes, start, park, cost);
             seam::choose_seams(strokes, start, park, cost) || turned
@@ -166,8 +184,8 @@ fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -
     ordered
 }
 
-/// Orders the strokes of a pen; closed strokes keep where they begin. The effort is that for so many strokes in all, of
-/// which this pen gets its share.
+/// Orders the strokes of one pen; start points of closed strokes are kept. `effort` is the effort
+/// level and the number of strokes of all pens: each pen gets its share of the work.
 fn search(
     strokes: Vec<Stroke>,
     start: Option<Point>,
@@ -182,12 +200,13 @@ fn search(
     in_order_of(strokes, &tour)
 }
 
-/// The strokes in the order of a tour, which begins with the depot, turned to be entered as it says.
+/// The strokes in the order of a tour that begins with the depot, reversed where the tour enters
+/// them at their end.
 fn in_order_of(strokes: Vec<Stroke>, tour: &[End]) -> Vec<Stroke> {
     let mut strokes: Vec<Option<Stroke>> = strokes.into_iter().map(Some).collect();
     let in_turn = tour.iter().skip(1).filter_map(|&entry| {
         let mut stroke = strokes[entry as usize / 2 - 1].take()?;
-        // A closed stroke ends where it begins: there is no reason to turn it.
+        // Reversing a closed stroke does not change its ends.
         if entry % 2 == 1 && !stroke.is_closed() {
             stroke.reverse();
         }

@@ -1,9 +1,10 @@
-//! Strokes that touch at their ends become one.
+//! Merging of strokes that touch at their ends.
 //!
-//! Where ends of strokes meet, they are paired; what is paired is drawn in one go. Pairing as many ends as possible at
-//! every point leaves one trail for every two points at which an odd number of ends meet, which is the fewest there
-//! can be, and closed circuits; a circuit that meets anything else is let into it (Euler 1736, Hierholzer 1873). Which
-//! ends are paired where more than two meet is free: the straightest first, because a machine is fastest straight on.
+//! Ends that meet at a point are paired, and paired ends are joined. Pairing as many ends as
+//! possible at every point leaves one trail for every two points at which an odd number of ends
+//! meet (the minimum), and closed circuits. A circuit that touches another trail is spliced into it
+//! (Euler 1736, Hierholzer 1873). Where more than two ends meet, the straightest pair is joined
+//! first, because machines are fastest on straight lines.
 
 use drawing::{Point, Stroke, Vec2};
 
@@ -12,20 +13,21 @@ use crate::touch::{Sets, same_points};
 /// End `2s` is where stroke `s` starts, end `2s + 1` where it ends.
 type End = usize;
 
-/// Above this many ends at a point they are paired as they come: all pairs would be too many to compare.
+/// Above this number of ends at a point they are paired in index order: the number of pairs to
+/// compare grows with the square.
 const MOST_COMPARED: usize = 64;
 
-/// Joins strokes that touch, all of one pen, into the fewest possible. Dots stay for themselves.
+/// Joins touching strokes (all of one pen) into the fewest possible strokes. Dots are not joined.
 ///
-/// A joined stroke stands where the first of its strokes stood, is drawn in that stroke's direction, and has its
-/// source. With `keep_direction`, ends are joined to starts only.
+/// A joined stroke takes the position, direction and source of its first stroke. With
+/// `keep_direction`, ends are joined to starts only.
 pub(crate) fn merge(strokes: Vec<Stroke>, keep_direction: bool) -> Vec<Stroke> {
     let partner = pair_ends(&strokes, keep_direction);
     let mut strokes: Vec<Option<Stroke>> = strokes.into_iter().map(Some).collect();
     let mut merged = Vec::new();
     for first in 0..strokes.len() {
         let Some(source) = strokes[first].as_ref().map(Stroke::source) else { continue };
-        // Back to where the trail begins, or around to where we are.
+        // Follow the trail back to its beginning, or around a circuit to this stroke.
         let mut entry = 2 * first;
         while let Some(before) = partner[entry] {
             entry = before ^ 1;
@@ -54,7 +56,7 @@ pub(crate) fn merge(strokes: Vec<Stroke>, keep_direction: bool) -> Vec<Stroke> {
     merged
 }
 
-/// The end that each end is joined to.
+/// For each end the end that it is joined to.
 fn pair_ends(strokes: &[Stroke], keep_direction: bool) -> Vec<Option<End>> {
     let points: Vec<Point> = strokes.iter().flat_map(|stroke| [stroke.start(), stroke.end()]).collect();
     let node = same_points(&points);
@@ -73,7 +75,7 @@ fn pair_ends(strokes: &[Stroke], keep_direction: bool) -> Vec<Option<End>> {
     partner
 }
 
-/// As many disjoint pairs of ends as there are; with `keep_direction`, of an end and a start.
+/// The largest set of disjoint pairs of ends; with `keep_direction`, pairs of an end and a start.
 fn straightest_pairs(strokes: &[Stroke], meeting: &[End], keep_direction: bool) -> Vec<(End, End)> {
     let mut left = meeting.to_vec();
     let mut pairs = Vec::with_capacity(meeting.len() / 2);
@@ -104,20 +106,21 @@ fn straightest_pairs(strokes: &[Stroke], meeting: &[End], keep_direction: bool) 
     pairs
 }
 
-/// The unit vector from a stroke's start, or its end, into the stroke; 0 if it does not go anywhere.
+/// The unit vector from the start (or end) of a stroke into the stroke; 0 if it has no length.
 fn direction(stroke: &Stroke, from_end: bool) -> Vec2 {
-    // The end of the first piece would do for lines; a point early on it does for curves too.
-    let piece = if from_end { stroke.segments().last() } else { stroke.segments().next() };
-    let Some(piece) = piece else { return Vec2::ZERO };
-    let away = if from_end { piece.eval(0.99) - piece.end() } else { piece.eval(0.01) - piece.start() };
+    // A point near the end, so that it works for curves too.
+    let segment = if from_end { stroke.segments().last() } else { stroke.segments().next() };
+    let Some(segment) = segment else { return Vec2::ZERO };
+    let away =
+        if from_end { segment.eval(0.99) - segment.end() } else { segment.eval(0.01) - segment.start() };
     let length = away.hypot2().sqrt();
     if length > 0.0 { away / length } else { Vec2::ZERO }
 }
 
-/// Which strokes hang together, and what of it has no ends.
+/// Connected sets of joined strokes, and which of them are closed circuits.
 struct Circuits {
     sets: Sets,
-    /// For the lowest stroke of each set: whether the set is a closed circuit.
+    /// For the lowest stroke of each set: whether the set is a circuit.
     closed: Vec<bool>,
 }
 
@@ -139,7 +142,7 @@ impl Circuits {
         Self { sets, closed }
     }
 
-    /// Makes one of two sets of which one is a circuit; whether they are such.
+    /// Unites two sets if at least one of them is a circuit; returns whether it did.
     fn join(&mut self, a: End, b: End) -> bool {
         let (a, b) = (self.sets.find(a as u32 / 2), self.sets.find(b as u32 / 2));
         let (a_closed, b_closed) = (self.closed[a as usize], self.closed[b as usize]);
@@ -151,7 +154,7 @@ impl Circuits {
         true
     }
 
-    /// Lets circuits through a point into the first of what else goes through it, by changing partners there.
+    /// Splices the circuits through a point into the first trail through it, by exchanging partners.
     fn splice(&mut self, meeting: &[End], partner: &mut [Option<End>]) {
         let Some(&anchor) = meeting.first() else { return };
         for &end in meeting {
@@ -161,8 +164,8 @@ impl Circuits {
             match (partner[anchor], partner[end]) {
                 (Some(a), Some(b)) if anchor % 2 == end % 2 => exchange(partner, (anchor, a), (b, end)),
                 (Some(a), Some(b)) => exchange(partner, (anchor, a), (end, b)),
-                // A trail begins or ends here: it goes on around the circuit first. What it is joined to must be
-                // of the other kind, a start to an end, in case directions count.
+                // A trail begins or ends here: it is extended by the circuit. A start is joined to an
+                // end, in case directions must be kept.
                 (None, Some(b)) => extend(partner, anchor, end, b),
                 (Some(a), None) => extend(partner, end, anchor, a),
                 (None, None) => {}
@@ -171,13 +174,14 @@ impl Circuits {
     }
 }
 
-/// Instead of `a.0` with `a.1` and `b.0` with `b.1`, joins `a.0` with `b.0` and `a.1` with `b.1`.
+/// Replaces the pairs `a` and `b` by `(a.0, b.0)` and `(a.1, b.1)`.
 fn exchange(partner: &mut [Option<End>], a: (End, End), b: (End, End)) {
     (partner[a.0], partner[b.0]) = (Some(b.0), Some(a.0));
     (partner[a.1], partner[b.1]) = (Some(b.1), Some(a.1));
 }
 
-/// Joins the open end to that of `a` and `b`, which were joined, that is of the other kind; the other one stays open.
+/// Separates the pair `(a, b)`, joins the one of the other kind (start or end) to `open`, and leaves
+/// the other one open.
 fn extend(partner: &mut [Option<End>], open: End, a: End, b: End) {
     let (join, leave) = if a % 2 == open % 2 { (b, a) } else { (a, b) };
     (partner[open], partner[join]) = (Some(join), Some(open));

@@ -1,32 +1,32 @@
-//! What ordering brought.
+//! The effect of ordering.
 
 use drawing::{Point, Stroke};
 
 use crate::{Cost, Options, distance};
 
-/// What [`optimize`](crate::optimize) did. Travel is all that is moved with the pen up: from the start to the first
-/// stroke, between strokes, and from the last stroke to the park position, where there are such.
+/// The effect of [`optimize`](crate::optimize). Travel is pen-up motion: from the start to the first
+/// stroke, between strokes, and from the last stroke to the park position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
-    /// Strokes handed in.
+    /// Number of strokes in the input.
     pub strokes_before: usize,
-    /// Strokes handed back: every one is a lift and a drop of the pen.
+    /// Number of strokes in the output; each takes a drop and a lift of the pen.
     pub strokes_after: usize,
-    /// Strokes saved by joining what touches.
+    /// Number of strokes saved by merging.
     pub merged: usize,
-    /// Strokes removed because other strokes draw the same.
+    /// Number of duplicate strokes removed.
     pub duplicates_removed: usize,
-    /// Travel of the file's order, in the unit of the cost.
+    /// Travel in file order, in the unit of the cost.
     pub travel_cost_before: f64,
-    /// Travel of the new order, in the unit of the cost.
+    /// Travel in the new order, in the unit of the cost.
     pub travel_cost_after: f64,
-    /// Travel of the file's order, mm.
+    /// Travel in file order, mm.
     pub travel_mm_before: f64,
-    /// Travel of the new order, mm.
+    /// Travel in the new order, mm.
     pub travel_mm_after: f64,
 }
 
-/// The travel of strokes drawn in this order: by the cost, and in mm.
+/// The travel of strokes in this order: in the unit of the cost, and in mm.
 pub(crate) fn travel(strokes: &[Stroke], cost: &dyn Cost, options: &Options) -> (f64, f64) {
     let mut from = options.start;
     let mut total = (0.0, 0.0);

@@ -1,17 +1,17 @@
-//! Where closed strokes begin.
+//! Start points of closed strokes.
 
 use drawing::{EllipticArc, Point, Segment, Stroke};
 
 use crate::Cost;
 
-/// Passes over the strokes; each can only make it cheaper, and few are left to move after two or three.
+/// Passes over the strokes. The cost never increases; after two or three passes few seams move.
 const PASSES: usize = 4;
 
-/// At how many places a circle or an ellipse of one piece may begin.
-const PLACES: u32 = 32;
+/// Number of candidate start points on a full circle or ellipse.
+const ARC_STARTS: u32 = 32;
 
-/// Lets each stroke that is one whole turn of a circle or an ellipse begin where that is the cheapest between its
-/// neighbours; whether any has changed. The points drawn are the same.
+/// Moves the start of each stroke that is a full circle or ellipse to the candidate with the lowest
+/// cost between its neighbours. Returns whether any start has moved. The ink does not change.
 pub(crate) fn turn_circles(
     strokes: &mut [Stroke],
     start: Option<Point>,
@@ -28,14 +28,14 @@ pub(crate) fn turn_circles(
             before.map_or(0.0, |p| cost.between(p, point)) + after.map_or(0.0, |p| cost.between(point, p))
         };
         let mut best = (detour(strokes[at].start()), 0);
-        for place in 1..PLACES {
-            let detour = detour(arc.eval(f64::from(place) / f64::from(PLACES)));
+        for candidate in 1..ARC_STARTS {
+            let detour = detour(arc.eval(f64::from(candidate) / f64::from(ARC_STARTS)));
             if detour < best.0 {
-                best = (detour, place);
+                best = (detour, candidate);
             }
         }
         if best.1 > 0 {
-            let start = arc.start_rad + f64::from(best.1) / f64::from(PLACES) * arc.sweep_rad;
+            let start = arc.start_rad + f64::from(best.1) / f64::from(ARC_STARTS) * arc.sweep_rad;
             let arc = EllipticArc { start_rad: start, ..arc };
             let mut stroke = Stroke::new(strokes[at].pen, arc.eval(0.0), strokes[at].source());
             stroke.arc(arc);
@@ -46,14 +46,15 @@ pub(crate) fn turn_circles(
     turned
 }
 
-/// The arc that a stroke is made of, if it is one and goes round once.
+/// The arc of a stroke that consists of one full circle or ellipse.
 fn whole_turn(stroke: &Stroke) -> Option<EllipticArc> {
     let mut segments = stroke.segments();
     let (Some(Segment::Arc(arc)), None) = (segments.next(), segments.next()) else { return None };
     ((arc.sweep_rad.abs() - std::f64::consts::TAU).abs() < 1e-9).then_some(arc)
 }
 
-/// Lets each closed stroke begin at the vertex that is the cheapest between its neighbours; whether any has changed.
+/// Moves the start of each closed stroke to the vertex with the lowest cost between its neighbours.
+/// Returns whether any start has moved.
 pub(crate) fn choose_seams(
     strokes: &mut [Stroke],
     start: Option<Point>,
@@ -100,7 +101,7 @@ pub(crate) fn choose_seams(
     seam.iter().any(|&vertex| vertex > 0)
 }
 
-/// Turns a closed stroke so that it begins, and ends, at another of its vertices.
+/// Makes a closed stroke begin and end at another of its vertices.
 fn begin_at(stroke: &mut Stroke, vertex: usize) {
     if vertex == 0 {
         return;

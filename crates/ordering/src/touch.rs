@@ -1,17 +1,17 @@
-//! Which points are the same.
+//! Points that touch.
 
 use drawing::Point;
 
-/// Side of the squares that points are sorted into, mm: those in one square or in neighbours touch, so that whatever
-/// is within 0.5e-6 mm touches, and nothing that is 1.5e-6 mm apart.
+/// Side of the grid squares, mm. Points in the same or in neighbouring squares touch: all points
+/// within 0.5e-6 mm do, and none more than 1.5e-6 mm apart.
 const SQUARE: f64 = 0.5e-6;
 
-/// The square that a point is in.
+/// The grid square of a point.
 pub(crate) fn square(p: Point) -> [i64; 2] {
     [(p.x / SQUARE).floor() as i64, (p.y / SQUARE).floor() as i64]
 }
 
-/// Numbers points so that those that touch, directly or through others, have the same number.
+/// A number for each point; points that touch, directly or through others, get the same number.
 pub(crate) fn same_points(points: &[Point]) -> Vec<u32> {
     let mut sorted: Vec<([i64; 2], u32)> = points.iter().map(|&p| square(p)).zip(0..).collect();
     sorted.sort_unstable();
@@ -38,7 +38,7 @@ pub(crate) fn same_points(points: &[Point]) -> Vec<u32> {
     (0..points.len() as u32).map(|index| sets.find(index)).collect()
 }
 
-/// Disjoint sets of numbers, each known by its lowest member.
+/// Disjoint sets (union-find), each represented by its lowest member.
 pub(crate) struct Sets(Vec<u32>);
 
 impl Sets {
@@ -49,7 +49,7 @@ impl Sets {
     pub(crate) fn find(&mut self, member: u32) -> u32 {
         let mut at = member;
         while self.0[at as usize] != at {
-            // Halves the path for those who come after.
+            // Path halving.
             self.0[at as usize] = self.0[self.0[at as usize] as usize];
             at = self.0[at as usize];
         }
