@@ -1,10 +1,11 @@
-//! Chores of the repository; `cargo xtask` alone lists them.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "chores talk to whoever runs them")]
-#![expect(clippy::disallowed_methods, reason = "chores look at the clock and at cargo's environment")]
+//! Development tasks of the repository; `cargo xtask` without arguments lists them.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "tasks print their results")]
+#![expect(clippy::disallowed_methods, reason = "tasks measure time and read cargo's environment")]
 
 use std::process::ExitCode;
 
 mod bench;
+mod ci;
 mod corpus;
 mod order;
 mod peers;
@@ -12,21 +13,28 @@ mod tidy;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
-  tidy          fail when a crate depends on one that it must not know, and on other untidiness
-  corpus DIR    run the release binary over every drawing below DIR: no panic, no hang, no plan without a certificate
-  peers [DIR …] read our drawings, and those below DIR, beside hp2xx (skipped where it is not installed): length and distance
-  order DIR     plan every drawing below DIR in the file's order and in ours, on two machines: a table of times
+  ci [STEP …]   run every check that a change must pass, or only the steps named
+  tidy          check the dependency rules between crates, and tracked files
+  corpus DIR    run the release binary on every drawing below DIR: no panic, no timeout, no plan
+                without a certificate
+  peers [DIR …] compare the interpretation of our drawings, and those below DIR, with hp2xx
+                (skipped if it is not installed): length and distance
+  order DIR     plan every drawing below DIR in file order and in optimized order, on two machines
   bench order GENERATOR
-                order the drawings that the script GENERATOR makes (python3 with numpy), beside references
+                order the drawings of the script GENERATOR (python3 with numpy); compare with
+                reference solutions
   bench read [GENERATOR]
-                bytes to drawing: speed, growth and memory, beside hp2xx and a ceiling; of inputs that the script GENERATOR
-                (python3) makes, or of our own
+                bytes to drawing: throughput, scaling and memory, compared with hp2xx; inputs from
+                the script GENERATOR (python3) or built in
   bench plan [PYTHON]
-                the planner's workload: duration, limits and speed, beside toppra where PYTHON (python3) has it";
+                the planner's workload: duration, limits and throughput, compared with toppra if
+                PYTHON (python3) has it
+";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["ci", ref steps @ ..] => ci::run_steps(steps),
         ["tidy"] => tidy::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
         ["bench", "order", generator] => order::bench(generator.as_ref()),
@@ -38,7 +46,7 @@ fn main() -> ExitCode {
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),
         _ => {
-            eprintln!("{USAGE}");
+            eprintln!("{USAGE}\nsteps of ci:\n{}", ci::list());
             return ExitCode::from(2);
         }
     };
@@ -52,7 +60,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The repository's top folder.
+/// The top folder of the repository.
 fn top() -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }

@@ -1,0 +1,199 @@
+//! Every check that a change must pass: `cargo xtask ci`, which `.ci/run` calls.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+/// One check: name, description and function. The function returns an error if the check fails.
+struct Step {
+    name: &'static str,
+    about: &'static str,
+    check: fn() -> Result<()>,
+    /// Whether `cargo xtask ci` without arguments includes the step.
+    by_default: bool,
+}
+
+const fn step(name: &'static str, about: &'static str, check: fn() -> Result<()>) -> Step {
+    Step { name, about, check, by_default: true }
+}
+
+const fn on_request(name: &'static str, about: &'static str, check: fn() -> Result<()>) -> Step {
+    Step { name, about, check, by_default: false }
+}
+
+/// All steps, in the order in which they run.
+const STEPS: &[Step] = &[
+    step("fmt", "formatting", || cargo("fmt --all --check")),
+    step("tidy", "dependency rules and file checks", tidy),
+    step("clippy", "lints", || cargo("clippy --workspace --all-targets --locked -- -D warnings")),
+    step("doc", "documentation builds without warnings", doc),
+    step("test", "the test command of the README", || cargo("test --workspace --locked")),
+    step("windows", "the program compiles for Windows", || check("x86_64-pc-windows-gnu", "plotplan")),
+    step("macos", "the program compiles for macOS", || check("aarch64-apple-darwin", "plotplan")),
+    step("corpus", "every drawing of ../shared/corpus, where it exists", corpus),
+    step("fuzz", "one minute of fuzzing; installs nightly and cargo-fuzz if missing", fuzz),
+    on_request("typos", "spelling; needs typos-cli", || run("typos", "")),
+    on_request("deny", "licences, bans and sources; needs cargo-deny", || {
+        cargo("deny --workspace check bans licenses sources")
+    }),
+];
+
+/// Default seed of the property tests: a failure in CI reproduces locally. The nightly workflow sets
+/// other seeds.
+const PROPTEST_SEED: &str = "20261122";
+
+/// Fuzz targets (`fuzz/fuzz_targets`), seconds for each.
+const FUZZ_TARGETS: &[&str] = &["read", "emit"];
+const FUZZ_SECONDS: u32 = 30;
+
+/// Runs the named steps, or the default ones, up to the first failure; prints the time of each.
+pub(crate) fn run_steps(names: &[&str]) -> Result<bool> {
+    for name in names {
+        ensure!(STEPS.iter().any(|step| step.name == *name), "no step {name}; steps are:\n{}", list());
+    }
+    let mut times = Vec::new();
+    for step in STEPS {
+        if !(names.contains(&step.name) || names.is_empty() && step.by_default) {
+            continue;
+        }
+        println!("\n== {}: {}", step.name, step.about);
+        let start = Instant::now();
+        let result = (step.check)();
+        times.push((step.name, start.elapsed().as_secs_f64()));
+        if let Err(error) = result {
+            summarize(&times);
+            eprintln!("\nFAILED: {}: {error:#}", step.name);
+            return Ok(false);
+        }
+    }
+    summarize(&times);
+    Ok(true)
+}
+
+/// Names and descriptions of all steps.
+pub(crate) fn list() -> String {
+    STEPS
+        .iter()
+        .map(|step| {
+            let note = if step.by_default { "" } else { " (only if named)" };
+            format!("    {:8} {}{note}\n", step.name, step.about)
+        })
+        .collect()
+}
+
+fn summarize(times: &[(&str, f64)]) {
+    println!();
+    for (name, seconds) in times {
+        println!("{name:8} {seconds:6.0} s");
+    }
+    println!("{:8} {:6.0} s", "total", times.iter().map(|(_, seconds)| seconds).sum::<f64>());
+}
+
+/// Runs `cargo` with arguments separated by blanks, at the top of the repository.
+fn cargo(arguments: &str) -> Result<()> {
+    run("cargo", arguments)
+}
+
+fn run(program: &str, arguments: &str) -> Result<()> {
+    execute(Command::new(program).args(arguments.split_whitespace()))
+}
+
+fn execute(command: &mut Command) -> Result<()> {
+    let arguments: Vec<_> = command.get_args().map(|argument| argument.to_string_lossy()).collect();
+    let line = format!("{} {}", command.get_program().to_string_lossy(), arguments.join(" "));
+    println!("$ {line}");
+    command.current_dir(crate::top()).env("INSTA_UPDATE", "no");
+    if std::env::var_os("PROPTEST_RNG_SEED").is_none() {
+        command.env("PROPTEST_RNG_SEED", PROPTEST_SEED);
+    }
+    let status = command.status().with_context(|| format!("cannot run {line}"))?;
+    ensure!(status.success(), "{line}: {status}");
+    Ok(())
+}
+
+/// Whether a command runs and succeeds; its output is discarded.
+fn succeeds(program: &str, arguments: &str) -> bool {
+    Command::new(program)
+        .args(arguments.split_whitespace())
+        .current_dir(crate::top())
+        .output()
+        .is_ok_and(|output| output.status.success())
+}
+
+fn tidy() -> Result<()> {
+    ensure!(crate::tidy::run()?, "see the complaints above");
+    Ok(())
+}
+
+fn doc() -> Result<()> {
+    execute(
+        Command::new("cargo")
+            .args(["doc", "--workspace", "--no-deps", "--locked"])
+            .env("RUSTDOCFLAGS", "-D warnings"),
+    )
+}
+
+/// Type-checks a package for another target, and installs the target's standard library if missing.
+/// No linker or C compiler for the target is needed.
+fn check(target: &str, package: &str) -> Result<()> {
+    let installed = Command::new("rustup")
+        .args(["target", "list", "--installed"])
+        .current_dir(crate::top())
+        .output()
+        .context("cannot run rustup, which installs the standard library of other targets")?;
+    if !String::from_utf8_lossy(&installed.stdout).lines().any(|line| line == target) {
+        run("rustup", &format!("target add {target}"))?;
+    }
+    cargo(&format!("check --locked --target {target} -p {package}"))
+}
+
+fn corpus() -> Result<()> {
+    let folder = crate::top().join("../shared/corpus");
+    if !folder.is_dir() {
+        println!("no corpus at ../shared/corpus: nothing to check");
+        return Ok(());
+    }
+    ensure!(crate::corpus::run(&folder)?, "see the drawings above");
+    Ok(())
+}
+
+/// Fuzzes every target from the project's own drawings. Fails if a nightly compiler or cargo-fuzz is
+/// missing and cannot be installed.
+fn fuzz() -> Result<()> {
+    if !succeeds("cargo", "+nightly --version") {
+        run("rustup", "toolchain install nightly --profile minimal").context("fuzzing needs nightly Rust")?;
+    }
+    if !succeeds("cargo", "+nightly fuzz --version") {
+        cargo("install cargo-fuzz --locked").context("fuzzing needs cargo-fuzz")?;
+    }
+    for target in FUZZ_TARGETS {
+        let seeds = crate::top().join("fuzz/corpus").join(target);
+        std::fs::create_dir_all(&seeds).with_context(|| format!("{}", seeds.display()))?;
+        for folder in ["examples", "tests/drawings"] {
+            copy_drawings(&crate::top().join(folder), &seeds)?;
+        }
+        cargo(&format!(
+            "+nightly fuzz run {target} -- -dict=fuzz/hpgl.dict -max_len=4096 -timeout=20 \
+             -max_total_time={FUZZ_SECONDS} -verbosity=0"
+        ))?;
+    }
+    Ok(())
+}
+
+fn copy_drawings(from: &Path, to: &Path) -> Result<()> {
+    let mut copied = 0;
+    for entry in std::fs::read_dir(from).with_context(|| format!("{}", from.display()))? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|e| e == "hpgl" || e == "pcl") {
+            let name = path.file_name().context("a file without a name")?;
+            std::fs::copy(&path, to.join(name)).with_context(|| format!("{}", path.display()))?;
+            copied += 1;
+        }
+    }
+    if copied == 0 {
+        bail!("no drawings in {}", from.display());
+    }
+    Ok(())
+}
