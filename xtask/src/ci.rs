@@ -30,10 +30,19 @@ const STEPS: &[Step] = &[
     step("clippy", "lints", || cargo("clippy --workspace --all-targets --locked -- -D warnings")),
     step("doc", "documentation builds without warnings", doc),
     step("test", "the test command of the README", || cargo("test --workspace --locked")),
+    step("wasm", "the compiler library builds for WebAssembly", || {
+        check("wasm32-unknown-unknown", "plotplan-compiler")
+    }),
     step("windows", "the program compiles for Windows", || check("x86_64-pc-windows-gnu", "plotplan")),
     step("macos", "the program compiles for macOS", || check("aarch64-apple-darwin", "plotplan")),
+    step("package", "every crate can be packaged", || {
+        cargo("package --workspace --no-verify --locked --allow-dirty --quiet")
+    }),
     step("corpus", "every drawing of ../shared/corpus, where it exists", corpus),
     step("fuzz", "one minute of fuzzing; installs nightly and cargo-fuzz if missing", fuzz),
+    on_request("verify-package", "every crate builds from its package", || {
+        cargo("package --workspace --locked --allow-dirty")
+    }),
     on_request("typos", "spelling; needs typos-cli", || run("typos", "")),
     on_request("deny", "licences, bans and sources; needs cargo-deny", || {
         cargo("deny --workspace check bans licenses sources")
@@ -74,13 +83,11 @@ pub(crate) fn run_steps(names: &[&str]) -> Result<bool> {
 
 /// Names and descriptions of all steps.
 pub(crate) fn list() -> String {
-    STEPS
-        .iter()
-        .map(|step| {
-            let note = if step.by_default { "" } else { " (only if named)" };
-            format!("    {:8} {}{note}\n", step.name, step.about)
-        })
-        .collect()
+    let line = |step: &Step| {
+        let note = if step.by_default { "" } else { " (only if named)" };
+        format!("    {:14} {}{note}", step.name, step.about)
+    };
+    STEPS.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn summarize(times: &[(&str, f64)]) {

@@ -1,12 +1,12 @@
-//! The walls of the house: who may know whom, read off the manifests.
+//! Dependency rules between crates, read from the manifests, and checks of tracked files.
 
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context as _, Result};
 
-/// Which crates of the workspace each crate may depend on. What is not listed must not be known.
-const MAY_KNOW: &[(&str, &[&str])] = &[
+/// For each crate, the workspace crates that it may depend on. Any other dependency is an error.
+const ALLOWED: &[(&str, &[&str])] = &[
     ("drawing", &[]),
     ("plan", &[]),
     ("hpgl", &["drawing"]),
@@ -35,7 +35,7 @@ const MAY_KNOW: &[(&str, &[&str])] = &[
     ("xtask", &["drawing", "hpgl", "kinematics", "plan", "planner"]),
 ];
 
-/// Outside crates that only some may use: the command line's, and formats' serialisation.
+/// External crates that only the listed crates may use.
 const RESERVED: &[(&str, &[&str])] = &[
     ("anyhow", &["plotplan", "xtask"]),
     ("clap", &["plotplan"]),
@@ -46,69 +46,67 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("serde_json", &["backends", "compiler", "plan", "plotplan", "xtask"]),
 ];
 
-/// Paths of a machine have no business in the repository.
-const MACHINE_PATHS: &[&str] = &["/work/", "/root/", "/tmp/target"];
+/// Absolute paths of a development machine, which must not be committed.
+const LOCAL_PATHS: &[&str] = &["/work/", "/root/", "/tmp/target"];
 
-/// Files beyond this many lines want a second look.
+/// Source files with more lines are listed as a note.
 const LONG: usize = 800;
 
-/// Prints what is untidy; true if nothing is.
+/// Prints all violations; returns whether there were none.
 pub(crate) fn run() -> Result<bool> {
     let top = crate::top();
-    let mut complaints = Vec::new();
+    let mut violations = Vec::new();
     let mut manifests = vec![top.join("xtask/Cargo.toml")];
-    for entry in std::fs::read_dir(top.join("crates")).context("no folder crates")? {
+    for entry in std::fs::read_dir(top.join("crates")).context("cannot list the folder crates")? {
         manifests.push(entry?.path().join("Cargo.toml"));
     }
     manifests.sort();
     for manifest in &manifests {
         let text = std::fs::read_to_string(manifest).with_context(|| format!("{}", manifest.display()))?;
-        complaints.extend(forbidden(&text).with_context(|| format!("{}", manifest.display()))?);
+        violations.extend(forbidden(&text).with_context(|| format!("{}", manifest.display()))?);
     }
     let listed = Command::new("git").arg("-C").arg(&top).arg("ls-files").output().context("git ls-files")?;
     for file in String::from_utf8_lossy(&listed.stdout).lines() {
-        complaints.extend(untidy(file, &std::fs::read(top.join(file)).unwrap_or_default()));
+        violations.extend(untidy(file, &std::fs::read(top.join(file)).unwrap_or_default()));
     }
-    for complaint in &complaints {
-        println!("{complaint}");
+    for violation in &violations {
+        println!("{violation}");
     }
-    println!("tidy: {} manifests, {} complaints", manifests.len(), complaints.len());
-    Ok(complaints.is_empty())
+    println!("tidy: {} manifests, {} violations", manifests.len(), violations.len());
+    Ok(violations.is_empty())
 }
 
-/// The dependencies of a manifest that its crate must not have.
+/// The dependencies of a manifest that break a rule.
 fn forbidden(manifest: &str) -> Result<Vec<String>> {
     let table: toml::Table = manifest.parse()?;
     let name = table
         .get("package")
         .and_then(|package| package.get("name"))
         .and_then(toml::Value::as_str)
-        .context("a package without a name")?;
-    // Packages are `plotplan-FOLDER`; inside the workspace a crate goes by its folder's name.
+        .context("package without a name")?;
+    // Packages are named `plotplan-FOLDER`; the rules use the names of the folders.
     let name = name.strip_prefix("plotplan-").unwrap_or(name);
-    let Some((_, allowed)) = MAY_KNOW.iter().find(|(krate, _)| *krate == name) else {
-        return Ok(vec![format!(
-            "{name}: a crate that xtask/src/tidy.rs does not know; say what it may know"
-        )]);
+    let Some((_, allowed)) = ALLOWED.iter().find(|(krate, _)| *krate == name) else {
+        return Ok(vec![format!("{name}: add its allowed dependencies to xtask/src/tidy.rs")]);
     };
-    let mut complaints = Vec::new();
+    let mut violations = Vec::new();
     for section in ["dependencies", "build-dependencies", "dev-dependencies"] {
         let Some(dependencies) = table.get(section).and_then(toml::Value::as_table) else { continue };
         for dependency in dependencies.keys() {
-            let ours = MAY_KNOW.iter().any(|(krate, _)| krate == dependency);
+            let ours = ALLOWED.iter().any(|(krate, _)| krate == dependency);
             if ours && !allowed.contains(&dependency.as_str()) {
-                complaints.push(format!("{name} must not know {dependency} ({section})"));
+                violations.push(format!("{name} must not depend on {dependency} ({section})"));
             }
             let reserved = RESERVED.iter().find(|(krate, _)| krate == dependency);
             if section != "dev-dependencies" && reserved.is_some_and(|(_, users)| !users.contains(&name)) {
-                complaints.push(format!("{name} must not use {dependency} ({section})"));
+                violations.push(format!("{name} must not depend on {dependency} ({section})"));
             }
         }
     }
-    Ok(complaints)
+    Ok(violations)
 }
 
-/// What is untidy about a tracked file.
+/// The violation found in a tracked file.
 fn untidy(file: &str, bytes: &[u8]) -> Option<String> {
     let source =
         Path::new(file).extension().is_some_and(|e| ["rs", "toml", "md"].iter().any(|known| e == *known));
@@ -116,11 +114,11 @@ fn untidy(file: &str, bytes: &[u8]) -> Option<String> {
         return None;
     }
     let text = String::from_utf8_lossy(bytes);
-    if let Some(path) = MACHINE_PATHS.iter().find(|path| text.contains(**path)) {
-        return Some(format!("{file}: names a path of some machine: {path}"));
+    if let Some(path) = LOCAL_PATHS.iter().find(|path| text.contains(**path)) {
+        return Some(format!("{file}: contains a local path: {path}"));
     }
     if text.contains('\r') {
-        return Some(format!("{file}: carriage returns"));
+        return Some(format!("{file}: contains carriage returns"));
     }
     let code = Path::new(file).extension().is_some_and(|e| e == "rs");
     if code && file.contains("/src/") && text.lines().count() > LONG {
@@ -138,19 +136,19 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_that_is_broken_is_named() {
+    fn forbidden_dependency_is_reported() {
         let broken = forbidden(&manifest("drawing", "dependencies", "kinematics")).unwrap();
-        assert_eq!(broken, ["drawing must not know kinematics (dependencies)"]);
+        assert_eq!(broken, ["drawing must not depend on kinematics (dependencies)"]);
         let broken = forbidden(&manifest("verify", "dev-dependencies", "planner")).unwrap();
-        assert_eq!(broken, ["verify must not know planner (dev-dependencies)"]);
+        assert_eq!(broken, ["verify must not depend on planner (dev-dependencies)"]);
         let broken = forbidden(&manifest("kinematics", "dependencies", "serde")).unwrap();
-        assert_eq!(broken, ["kinematics must not use serde (dependencies)"]);
+        assert_eq!(broken, ["kinematics must not depend on serde (dependencies)"]);
         assert!(forbidden(&manifest("planner", "dependencies", "kinematics")).unwrap().is_empty());
         assert_eq!(forbidden(&manifest("newcomer", "dependencies", "libm")).unwrap().len(), 1);
     }
 
     #[test]
-    fn paths_of_a_machine_are_found() {
+    fn local_path_is_reported() {
         assert!(untidy("a.md", b"see /root/x").is_some());
         assert!(untidy("a.rs", b"fn f() {}\n").is_none());
     }
