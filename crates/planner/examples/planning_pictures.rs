@@ -5,7 +5,7 @@ use std::path::Path;
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::lift::{Cell, Course};
+use planner::joint_path::{Cell, Course};
 use planner::path::{Budget, Corner, Section, sections};
 use planner::time_law::{SpeedCap, profile};
 use planner::{JointPath, Settings, plan};

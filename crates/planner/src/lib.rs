@@ -5,7 +5,7 @@
 //! ```
 //! 1. [`path`]: a stroke becomes smooth **sections**: fewer pieces within the tolerance, corners as parabolas. The pen rests
 //!    only where it turns back.
-//! 2. [`lift`]: a section is lifted into joint space as a [`JointPath`]: **cells** with the motors' first and second
+//! 2. [`joint_path`]: a section is lifted into joint space as a [`JointPath`]: **cells** with the motors' first and second
 //!    derivatives along it at start, middle and end, and how much rows bend against it.
 //! 3. [`time_law`]: along a joint path, the fastest speed profile that the motors and the rows allow, from rest to rest.
 //! 4. `stroke`: the three for one stroke, from one of the poses in which the machine can begin it.
@@ -15,7 +15,7 @@
 //! Drawings come in machine mm (see [`placement`]). Nothing here knows HPGL, formats or files.
 
 mod error;
-pub mod lift;
+pub mod joint_path;
 pub mod path;
 pub mod placement;
 pub mod settings;
@@ -25,7 +25,7 @@ pub mod trajectory;
 mod travel;
 
 pub use error::PlanError;
-pub use lift::JointPath;
+pub use joint_path::JointPath;
 pub use settings::{Law, Settings};
 pub use time_law::{Ease, Limiting};
 pub use trajectory::{ExactRow, Times, Trajectory, check_reach, plan};

@@ -5,7 +5,7 @@ use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
     Settings,
-    lift::{Course, JointPath},
+    joint_path::{Course, JointPath},
     path::{Budget, Section, sections, vertex_to_vertex},
     settings::{Law, Shares},
     time_law::{Profile, SpeedCap, eased, profile},

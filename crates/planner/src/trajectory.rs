@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::{
     PlanError, Settings,
-    lift::Course,
+    joint_path::Course,
     settings::{self, Shares},
     stroke::{Drawn, Move, StrokePlanner, whole_periods},
     time_law::Limiting,

@@ -3,7 +3,7 @@
 use drawing::Point;
 use kinematics::{JointPos, Machine};
 
-use crate::lift::travel_speed;
+use crate::joint_path::travel_speed;
 
 /// The pose in which the pen is taken to be at a point when travel is compared: that nearest to the start pose. Nothing
 /// where the point is out of reach.

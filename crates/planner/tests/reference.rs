@@ -18,7 +18,7 @@ use clarabel::solver::{
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
 use planner::JointPath;
-use planner::lift::Course;
+use planner::joint_path::Course;
 use planner::path::{Budget, Corner, Piece, sections};
 use planner::time_law::{SpeedCap, profile};
 use proptest::prelude::*;

@@ -8,7 +8,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::lift::Course;
+use planner::joint_path::Course;
 use planner::path::{Budget, Corner, sections};
 use planner::placement::{Size, Wish, place};
 use planner::time_law::{Profile, SpeedCap, profile, rough_profile};

@@ -12,7 +12,7 @@
 use kinematics::Machine;
 
 use super::{Profile, SpeedCap, bounds::Bounds};
-use crate::lift::{Cell, Course, JointPath};
+use crate::joint_path::{Cell, Course, JointPath};
 
 /// How many of the path's own cells are refined together: memory and cost follow it, and its ends are held to the
 /// speeds of the coarse law.

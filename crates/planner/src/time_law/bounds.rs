@@ -16,7 +16,7 @@
 use kinematics::Machine;
 
 use super::{Limiting, Phase, Profile, SpeedCap};
-use crate::lift::Cell;
+use crate::joint_path::Cell;
 
 /// The condition `|p u + r b| <= 1`, p >= 0, with b at the cell's start.
 #[derive(Clone, Copy, Debug, Default)]

@@ -25,7 +25,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use super::polygon::Polygon;
 use super::{Phase, Profile, SpeedCap, acceleration, straight};
-use crate::lift::{Course, JointPath, Rates, third_derivative};
+use crate::joint_path::{Course, JointPath, Rates, third_derivative};
 use crate::path::Piece;
 
 /// How often b* is put where the speeds are.

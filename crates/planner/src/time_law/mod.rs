@@ -9,7 +9,7 @@ mod straight;
 
 use kinematics::Machine;
 
-use crate::lift::JointPath;
+use crate::joint_path::JointPath;
 
 /// A stretch on which the acceleration is even, or changes evenly by time or by the way.
 ///
