@@ -7,7 +7,7 @@ use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::joint_path::{Cell, Course};
 use planner::path::{Budget, Corner, Section, sections};
-use planner::time_law::{SpeedCap, profile};
+use planner::time_parametrization::{SpeedCap, profile};
 use planner::{JointPath, Settings, plan};
 
 type Failure = Box<dyn std::error::Error>;

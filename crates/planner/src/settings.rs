@@ -6,7 +6,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 use crate::{
     PlanError,
     path::{Budget, Corner},
-    time_law::Ease,
+    time_parametrization::Ease,
 };
 
 /// How a plan is made.

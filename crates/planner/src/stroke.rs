@@ -8,7 +8,7 @@ use crate::{
     joint_path::{Course, JointPath},
     path::{Budget, Section, sections, vertex_to_vertex},
     settings::{Law, Shares},
-    time_law::{Profile, SpeedCap, eased, profile},
+    time_parametrization::{Profile, SpeedCap, eased, profile},
 };
 
 /// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops and pen events fall on

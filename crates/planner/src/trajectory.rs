@@ -17,7 +17,7 @@ use crate::{
     joint_path::Course,
     settings::{self, Shares},
     stroke::{Drawn, Move, StrokePlanner, whole_periods},
-    time_law::Limiting,
+    time_parametrization::Limiting,
 };
 
 /// How much geometry is planned at once, in curves of the drawing.

@@ -5,7 +5,7 @@ use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::Machine;
 use planner::JointPath;
 use planner::path::{Budget, Corner, sections};
-use planner::time_law::{SpeedCap, profile};
+use planner::time_parametrization::{SpeedCap, profile};
 
 mod machines;
 

@@ -20,7 +20,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 use planner::JointPath;
 use planner::joint_path::Course;
 use planner::path::{Budget, Corner, Piece, sections};
-use planner::time_law::{SpeedCap, profile};
+use planner::time_parametrization::{SpeedCap, profile};
 use proptest::prelude::*;
 
 mod machines;

@@ -11,7 +11,7 @@ use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Mo
 use planner::joint_path::Course;
 use planner::path::{Budget, Corner, sections};
 use planner::placement::{Size, Wish, place};
-use planner::time_law::{Profile, SpeedCap, profile, rough_profile};
+use planner::time_parametrization::{Profile, SpeedCap, profile, rough_profile};
 use planner::{JointPath, Settings, Trajectory};
 
 use super::{fastest, workload};
