@@ -46,7 +46,7 @@ pub struct Cell {
     /// at even speed leave the curve by `(ds/dt)² T² bend / 8` at the most.
     pub bend: f64,
     /// Whether rows also leave the curve by how the pen speeds up: by `|d²s/dt²| T² pen_speed / 8` more.
-    pub near_turn: bool,
+    pub near_corner: bool,
     /// By how much the derivatives may exceed a straight line between the three samples, as a share of the limits: 0
     /// where they are linear in `s` (lines and parabolas on machines whose kinematics are linear).
     pub slack: f64,
@@ -101,7 +101,7 @@ impl JointPath {
                 second: [MotorPos::ZERO; 3],
                 pen_speed,
                 bend: 0.0,
-                near_turn: false,
+                near_corner: false,
                 slack: 0.0,
             }],
         })
@@ -283,7 +283,7 @@ impl Lifter<'_> {
                 second,
                 pen_speed: most(|rates| rates.pen_speed),
                 bend: most(|rates| rates.bend),
-                near_turn: piece.near_turn,
+                near_corner: piece.near_corner,
                 slack: self.slack(piece, &a, &middle, &b)?,
             });
         }

@@ -8,7 +8,7 @@
 
 mod blend;
 mod simplify;
-mod zones;
+mod slow_zones;
 
 use drawing::{Line, Point, Segment, Stroke, Vec2};
 
@@ -48,7 +48,7 @@ pub struct Piece {
     /// dt/ds, 1/mm: how fast the curve's own parameter runs.
     pub rate: f64,
     /// Whether rows on it may deviate because of how the pen speeds up: on turns and near them.
-    pub near_turn: bool,
+    pub near_corner: bool,
 }
 
 impl Piece {
@@ -71,7 +71,7 @@ pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
     let pieces = if budget.simplify > 0.0 { simplify::simplify(pieces, budget.simplify) } else { pieces };
     let sections = blend::sections(&pieces, budget.blend, budget.corner).into_iter().map(parametrise);
     sections
-        .map(|section| if budget.row.is_finite() { zones::mark(section, budget.row) } else { section })
+        .map(|section| if budget.row.is_finite() { slow_zones::mark(section, budget.row) } else { section })
         .collect()
 }
 
@@ -116,7 +116,7 @@ fn parametrise(curves: Vec<Segment>) -> Section {
         let (start, end) = (velocity(&curve, 0.0), velocity(&curve, 1.0));
         let rate = speed / start;
         speed = rate * end;
-        Piece { curve, rate, near_turn: false }
+        Piece { curve, rate, near_corner: false }
     };
     curves.into_iter().map(piece).collect()
 }
@@ -181,7 +181,7 @@ mod tests {
         let sections = sections(&stroke, &EXACT);
         assert_eq!(sections.len(), 2);
         let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(5.0, 0.0)));
-        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2, near_turn: false }]);
+        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2, near_corner: false }]);
     }
 
     #[test]

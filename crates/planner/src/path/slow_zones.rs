@@ -19,7 +19,7 @@ pub(super) fn mark(section: Section, row: f64) -> Section {
     let mut s = 0.0;
     for piece in &section {
         let end = s + piece.length();
-        if let Some(second) = turning(piece) {
+        if let Some(second) = second_derivative(piece) {
             let width = (8.0 * row / second).sqrt() + 4.0 * row;
             match zones.last_mut() {
                 Some(last) if last.1 >= s - width => last.1 = last.1.max(end + width),
@@ -36,14 +36,14 @@ pub(super) fn mark(section: Section, row: f64) -> Section {
         let mut from = s;
         while from < end {
             while zones.next_if(|zone| zone.1 <= from).is_some() {}
-            let (to, near_turn) = match zones.peek() {
+            let (to, near_corner) = match zones.peek() {
                 Some(zone) if zone.0 <= from => (zone.1.min(end), true),
                 Some(zone) => (zone.0.min(end), false),
                 None => (end, false),
             };
             // Slivers are not worth a piece.
             let to = if end - to < 1e-6 { end } else { to };
-            marked.push(part(&piece, (from - s) * piece.rate, (to - s) * piece.rate, near_turn));
+            marked.push(part(&piece, (from - s) * piece.rate, (to - s) * piece.rate, near_corner));
             from = to;
         }
         s = end;
@@ -52,7 +52,7 @@ pub(super) fn mark(section: Section, row: f64) -> Section {
 }
 
 /// |p''| where a piece is not straight.
-fn turning(piece: &Piece) -> Option<f64> {
+fn second_derivative(piece: &Piece) -> Option<f64> {
     if matches!(piece.curve, Segment::Line(_)) {
         return None;
     }
@@ -65,11 +65,11 @@ fn turning(piece: &Piece) -> Option<f64> {
 }
 
 /// A part of a piece, from t0 to t1 of its curve's own parameter.
-fn part(piece: &Piece, t0: f64, t1: f64, near_turn: bool) -> Piece {
+fn part(piece: &Piece, t0: f64, t1: f64, near_corner: bool) -> Piece {
     if t0 <= 0.0 && t1 >= 1.0 {
-        return Piece { near_turn, ..*piece };
+        return Piece { near_corner, ..*piece };
     }
-    Piece { curve: piece.curve.part(t0, t1.min(1.0)), rate: piece.rate / (t1.min(1.0) - t0), near_turn }
+    Piece { curve: piece.curve.part(t0, t1.min(1.0)), rate: piece.rate / (t1.min(1.0) - t0), near_corner }
 }
 
 #[cfg(test)]
@@ -87,14 +87,14 @@ mod tests {
             Point::new(10.0, 0.1),
             Point::new(10.0, 0.3),
         );
-        let piece = |curve: Segment, length: f64| Piece { curve, rate: 1.0 / length, near_turn: false };
+        let piece = |curve: Segment, length: f64| Piece { curve, rate: 1.0 / length, near_corner: false };
         let section = vec![
             piece(line((0.0, 0.0), (9.7, 0.0)), 9.7),
             piece(Segment::Cubic(blend), 0.6),
             piece(line((10.0, 0.3), (10.0, 10.0)), 9.7),
         ];
         let marked = mark(section, 0.02);
-        let flags: Vec<bool> = marked.iter().map(|piece| piece.near_turn).collect();
+        let flags: Vec<bool> = marked.iter().map(|piece| piece.near_corner).collect();
         assert_eq!(flags, [false, true, true, true, false]);
         // |p''| = |v - u| / (2 leg) = 1.414 / 0.6.
         let width = (8.0 * 0.02 / (2.0_f64.sqrt() / 0.6)).sqrt() + 0.08;

@@ -9,7 +9,7 @@
 //! On a cell `u` is constant, so b is linear in s. The conditions are held at the cell's start, middle and end; by what m' and
 //! m'' may leave straight lines between those (the cell's [`Cell::slack`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the cell that is
 //! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
-//! two more near turns, where rows would cut them (see `path::zones`).
+//! two more near turns, where rows would cut them (see `path::slow_zones`).
 //!
 //! The programs in (u, b) are solved in closed form by comparing every lower bound of u with every upper one.
 
@@ -81,14 +81,14 @@ impl Bounds {
             let speed = motor.max_speed_ticks_s / (fastest * (1.0 + cell.slack));
             lower(speed * speed, Cap::Motor(k));
         }
-        if cell.near_turn {
+        if cell.near_corner {
             // |p'| |u| + bend b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
             let (p, r) = (cell.pen_speed / rows, cell.bend / rows);
             strips[6] = Strip { p, r };
             strips[7] = Strip { p, r: -r };
         }
         let twice = 2.0 * cell.length;
-        let top = highest(if cell.near_turn { &strips } else { &strips[..6] }, twice).min(largest);
+        let top = highest(if cell.near_corner { &strips } else { &strips[..6] }, twice).min(largest);
         Self { strips, twice, cap: largest, top, capped_by }
     }
 

@@ -278,7 +278,7 @@ fn cells(
             let place = |share: f64| Place::at(machine, piece, start + share * length);
             let places = [place(0.0)?, place(0.5)?, place(1.0)?];
             let top = places.iter().map(|place| place.cap(cap)).fold(f64::INFINITY, f64::min);
-            let row_limit = if cell.near_turn { rows } else { f64::INFINITY };
+            let row_limit = if cell.near_corner { rows } else { f64::INFINITY };
             let aim = SHARES.map(|share| {
                 let s = s + share * length;
                 let b = speeds.square(cell.piece, start + share * length).min(top);
