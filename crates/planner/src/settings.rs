@@ -6,7 +6,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 use crate::{
     PlanError,
     path::{Budget, Corner},
-    time_parametrization::Ease,
+    time_parametrization::Easing,
 };
 
 /// How a plan is made.
@@ -35,11 +35,11 @@ pub enum Law {
     /// As fast as the motors can from vertex to vertex, with a rest at each.
     Trapezoid,
     /// The same time for every piece between two vertices, whatever the motors can.
-    Eased {
+    FixedDuration {
         /// How the way goes with time.
-        ease: Ease,
+        easing: Easing,
         /// The time, s; rounded to whole periods, one at least.
-        segment_time: f64,
+        segment_time_s: f64,
     },
 }
 
@@ -133,6 +133,6 @@ pub(crate) fn check(settings: &Settings) -> Result<(), PlanError> {
         (0.0..=3600.0).contains(&settings.lift_overlap),
         "the overlap of lifts must be between 0 and an hour",
     )?;
-    let Law::Eased { segment_time, .. } = settings.law else { return Ok(()) };
-    setting((1e-6..=3600.0).contains(&segment_time), "the time of a segment must be between 1 us and an hour")
+    let Law::FixedDuration { segment_time_s, .. } = settings.law else { return Ok(()) };
+    setting((1e-6..=3600.0).contains(&segment_time_s), "the time of a segment must be between 1 us and an hour")
 }

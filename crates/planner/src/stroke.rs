@@ -8,7 +8,7 @@ use crate::{
     joint_path::{Course, JointPath},
     path::{Budget, Section, sections, vertex_to_vertex},
     settings::{Law, Shares},
-    time_parametrization::{Profile, SpeedCap, eased, profile},
+    time_parametrization::{Profile, SpeedCap, fixed_duration, profile},
 };
 
 /// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops and pen events fall on
@@ -95,7 +95,7 @@ impl StrokePlanner<'_> {
                 self.follow(stroke, pose, sections(&self.shares.path))
                     .or_else(|_| self.follow(stroke, pose, sections(&exact)))
             }
-            Law::Trapezoid | Law::Eased { .. } => self.follow(stroke, pose, vertex_to_vertex(stroke, &exact)),
+            Law::Trapezoid | Law::FixedDuration { .. } => self.follow(stroke, pose, vertex_to_vertex(stroke, &exact)),
         }
     }
 
@@ -123,12 +123,12 @@ impl StrokePlanner<'_> {
     /// Lays the time law upon a path.
     fn movement(&self, path: JointPath, end: JointPos, pen: f64) -> Move {
         let period = self.period();
-        if let (Law::Eased { ease, segment_time }, Course::Drawn(_, section)) =
+        if let (Law::FixedDuration { easing, segment_time_s }, Course::Drawn(_, section)) =
             (self.settings.law, &path.course)
         {
-            let periods = (segment_time / period).round().max(1.0) as u64;
+            let periods = (segment_time_s / period).round().max(1.0) as u64;
             let length = section.iter().map(crate::path::Piece::length).sum();
-            let profile = eased(ease, length, periods as f64 * period);
+            let profile = fixed_duration(easing, length, periods as f64 * period);
             return Move { course: path.course, profile, end, periods };
         }
         let cap = SpeedCap { pen, row_deviation: self.shares.row, period };

@@ -4,7 +4,7 @@
 use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
 use planner::placement::{Size, Wish, place};
-use planner::{Ease, ExactRow, Law, PlanError, Settings, plan};
+use planner::{Easing, ExactRow, Law, PlanError, Settings, plan};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -368,19 +368,19 @@ fn fitting_lays_an_arch_around_the_hole() {
 fn laws_with_a_given_time_give_it_to_every_piece() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0), (10.0, 10.0)]);
-    for ease in [Ease::Linear, Ease::SineOut, Ease::QuadraticInOut] {
-        let law = Law::Eased { ease, segment_time: 0.504 };
+    for easing in [Easing::Linear, Easing::SineOut, Easing::QuadraticInOut] {
+        let law = Law::FixedDuration { easing, segment_time_s: 0.504 };
         let trajectory = plan(&machine, drawing.clone(), &Settings { law, ..settings() }).unwrap();
         assert!((trajectory.times().drawing - 3.0 * 0.5).abs() < 1e-9);
         // Half way in time: x, sin(pi / 4) and a half.
         let down = trajectory.rows().position(|row| row.row.pen == 1).unwrap();
-        let share = match ease {
-            Ease::SineOut => std::f64::consts::FRAC_1_SQRT_2,
-            Ease::Linear | Ease::QuadraticInOut => 0.5,
+        let share = match easing {
+            Easing::SineOut => std::f64::consts::FRAC_1_SQRT_2,
+            Easing::Linear | Easing::QuadraticInOut => 0.5,
         };
         let middle = trajectory.rows().nth(down + 1 + 25).unwrap();
         let at = machine.forward_from_motors(&MotorPos::from(middle.exact));
-        assert!((at.x - (10.0 + 50.0 * share)).abs() < 1e-9, "{ease:?} at {at}");
+        assert!((at.x - (10.0 + 50.0 * share)).abs() < 1e-9, "{easing:?} at {at}");
     }
 }
 

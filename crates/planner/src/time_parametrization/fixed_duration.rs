@@ -8,7 +8,7 @@ use super::{Phase, Profile};
 
 /// How the way goes with time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ease {
+pub enum Easing {
     /// y = x: evenly, from a jump in speed to another.
     Linear,
     /// y = sin(pi x / 2): from a jump in speed, pi/2 of the mean, slower and slower to rest.
@@ -18,18 +18,18 @@ pub enum Ease {
 }
 
 /// Over a piece of this length (in the path's parameter) in `time` s.
-pub fn eased(ease: Ease, length: f64, time: f64) -> Profile {
+pub fn fixed_duration(easing: Easing, length: f64, time: f64) -> Profile {
     let mean = length / time;
     let mut profile = Profile::new();
-    match ease {
-        Ease::Linear => profile.push(Phase::even(0, 0.0, mean, 0.0, time)),
-        Ease::SineOut => {
+    match easing {
+        Easing::Linear => profile.push(Phase::even(0, 0.0, mean, 0.0, time)),
+        Easing::SineOut => {
             // s'' = -omega² s with omega = pi / (2 T).
             let omega = FRAC_PI_2 / time;
             let growth = -omega * omega;
             profile.push(Phase { growth, ..Phase::even(0, 0.0, length * omega, 0.0, time) });
         }
-        Ease::QuadraticInOut => {
+        Easing::QuadraticInOut => {
             let acceleration = 4.0 * mean / time;
             profile.push(Phase::even(0, 0.0, 0.0, acceleration, 0.5 * time));
             profile.push(Phase::even(0, 0.5 * length, 2.0 * mean, -acceleration, 0.5 * time));
@@ -56,19 +56,19 @@ mod tests {
 
     #[test]
     fn laws_go_as_they_are_defined() {
-        for (ease, y) in [
-            (Ease::Linear, (|x| x) as fn(f64) -> f64),
-            (Ease::SineOut, |x| libm::sin(FRAC_PI_2 * x)),
-            (Ease::QuadraticInOut, |x| {
+        for (easing, y) in [
+            (Easing::Linear, (|x| x) as fn(f64) -> f64),
+            (Easing::SineOut, |x| libm::sin(FRAC_PI_2 * x)),
+            (Easing::QuadraticInOut, |x| {
                 if x < 0.5 { 2.0 * x * x } else { 1.0 - 0.5 * (2.0 - 2.0 * x) * (2.0 - 2.0 * x) }
             }),
         ] {
-            let profile = eased(ease, 7.0, 1.5);
+            let profile = fixed_duration(easing, 7.0, 1.5);
             assert!((profile.duration - 1.5).abs() < 1e-12);
             for k in 0..=100 {
                 let x = f64::from(k) / 100.0;
                 let off = at(&profile, (1.5 * x).min(profile.duration)) - 7.0 * y(x);
-                assert!(off.abs() < 1e-11, "{ease:?} at {x}: off by {off}");
+                assert!(off.abs() < 1e-11, "{easing:?} at {x}: off by {off}");
             }
         }
     }

@@ -2,7 +2,7 @@
 
 mod acceleration;
 mod bounds;
-mod eased;
+mod fixed_duration;
 mod jerk;
 mod polygon;
 mod straight;
@@ -150,7 +150,7 @@ impl Limiting {
     }
 }
 
-pub use eased::{Ease, eased};
+pub use fixed_duration::{Easing, fixed_duration};
 
 /// The fastest profile along `path` under the machine's motors and the cap.
 pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
