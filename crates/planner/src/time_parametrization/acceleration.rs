@@ -11,7 +11,7 @@
 
 use kinematics::Machine;
 
-use super::{Profile, SpeedCap, bounds::Bounds};
+use super::{Profile, SpeedCap, constraints::IntervalConstraints};
 use crate::joint_path::{Cell, Course, JointPath};
 
 /// How many of the path's own cells are refined together: memory and cost follow it, and its ends are held to the
@@ -64,7 +64,7 @@ pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Prof
 #[derive(Clone)]
 struct Held {
     cell: Cell,
-    bounds: Bounds,
+    constraints: IntervalConstraints,
 }
 
 /// The fastest way over some cells.
@@ -80,7 +80,7 @@ struct Law {
 impl Law {
     /// Over all of a path, from rest to rest.
     fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
-        let hold = |cell: &Cell| Held { bounds: Bounds::new(machine, cell, cap), cell: *cell };
+        let hold = |cell: &Cell| Held { constraints: IntervalConstraints::new(machine, cell, cap), cell: *cell };
         let mut law = Self { cells: path.cells.iter().map(hold).collect(), ..Self::default() };
         law.sweep(0.0, 0.0);
         law
@@ -101,7 +101,7 @@ impl Law {
     }
 
     fn time(&self) -> f64 {
-        self.runs().map(|(held, from, to)| held.bounds.time(from, to)).sum()
+        self.runs().map(|(held, from, to)| held.constraints.time(from, to)).sum()
     }
 
     /// The node at which a window that is to end at `wanted` should: where the law is nearest to the largest speed, or on
@@ -113,7 +113,7 @@ impl Law {
         let room = |k: usize| {
             let (before, after) = (&self.cells[k - 1], &self.cells[k]);
             let straight = before.cell.is_straight() && after.cell.is_straight();
-            if straight { 2.0 } else { self.nodes[k] / before.bounds.cap.min(after.bounds.cap) }
+            if straight { 2.0 } else { self.nodes[k] / before.constraints.cap.min(after.constraints.cap) }
         };
         let best = (wanted..wanted + WINDOW / 4).fold((wanted, 0.0), |best, k| {
             let room = room(k);
@@ -135,7 +135,7 @@ impl Law {
                 self.cells[*index].cell.cut(machine, course, cuts, &mut finer);
                 if finer.len() > 1 {
                     order.extend(self.cells.len()..self.cells.len() + finer.len());
-                    let hold = |cell: &Cell| Held { bounds: Bounds::new(machine, cell, cap), cell: *cell };
+                    let hold = |cell: &Cell| Held { constraints: IntervalConstraints::new(machine, cell, cap), cell: *cell };
                     self.cells.extend(finer.iter().map(hold));
                 } else {
                     order.push(*index);
@@ -160,17 +160,17 @@ impl Law {
     fn cuts(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
         let mut cuts = Vec::with_capacity(self.order.len());
         let (mut cost, mut hanging) = (0.0, false);
-        for (Held { bounds, cell }, from, to) in self.runs() {
-            let own_time = bounds.time(from, to);
+        for (Held { constraints, cell }, from, to) in self.runs() {
+            let own_time = constraints.time(from, to);
             if own_time < shortest {
                 cuts.push(0);
                 continue;
             }
             // What the limits were lowered by for want of samples counts as idle too.
-            let idleness = bounds.idleness(from, to) + cell.slack;
+            let idleness = constraints.idleness(from, to) + cell.slack;
             // A motion with limits lower by a share takes longer by half of it.
             cost += 0.5 * idleness * own_time;
-            let hangs = bounds.hangs_on_speed(from, to);
+            let hangs = constraints.hangs_on_speed(from, to);
             hanging |= hangs;
             // Half the length, half the idleness.
             let thresholds = [IDLE, 3.0 * IDLE, 6.0 * IDLE];
@@ -203,7 +203,7 @@ impl Law {
 
     fn emit(&self, profile: &mut Profile) {
         for (held, from, to) in self.runs() {
-            held.bounds.phases(&held.cell, from, to, profile);
+            held.constraints.phases(&held.cell, from, to, profile);
         }
     }
 }
@@ -213,11 +213,11 @@ fn sweeps(cells: &[Held], order: &[usize], start: f64, end: f64, nodes: &mut Vec
     nodes.clear();
     nodes.resize(order.len() + 1, end);
     for (k, index) in order.iter().enumerate().rev() {
-        let bounds = &cells[*index].bounds;
-        let before = if k > 0 { cells[order[k - 1]].bounds.cap } else { start };
-        nodes[k] = bounds.largest(nodes[k + 1]).min(before);
+        let constraints = &cells[*index].constraints;
+        let before = if k > 0 { cells[order[k - 1]].constraints.cap } else { start };
+        nodes[k] = constraints.largest(nodes[k + 1]).min(before);
     }
     for (k, index) in order.iter().enumerate() {
-        nodes[k + 1] = cells[*index].bounds.fastest(nodes[k], nodes[k + 1]);
+        nodes[k + 1] = cells[*index].constraints.fastest(nodes[k], nodes[k + 1]);
     }
 }

@@ -27,7 +27,7 @@ struct Strip {
 
 /// A cell's conditions.
 #[derive(Clone, Debug)]
-pub(super) struct Bounds {
+pub(super) struct IntervalConstraints {
     /// Three of each motor, at the cell's start, middle and end, and two near turns.
     strips: [Strip; 8],
     /// Twice the cell's length: b at its end is `b + twice * u`.
@@ -57,7 +57,7 @@ enum Run {
     Peak { b: f64, up: f64, down: f64 },
 }
 
-impl Bounds {
+impl IntervalConstraints {
     pub(super) fn new(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> Self {
         let mut strips = [Strip::default(); 8];
         let pen = cap.pen / cell.pen_speed;

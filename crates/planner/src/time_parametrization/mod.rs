@@ -1,7 +1,7 @@
 //! Time-optimal speed along a joint path under every motor's speed, acceleration and jerk, from rest to rest.
 
 mod acceleration;
-mod bounds;
+mod constraints;
 mod fixed_duration;
 mod jerk;
 mod polygon;
