@@ -7,7 +7,7 @@
 //! jerk          |½ m' w + 3/2 m'' c + m''' b|  √b         <= j
 //! ```
 //! `w` is constant on a cell, so b is a parabola and the motion `d²s/dt² = c/2 + w s/2`. Divided by √b the right side of the
-//! second, `j / √b`, is convex in b: its tangent at any b* lies below it, so with `j (3/2 - b / (2 b*)) / √b*` in its place
+//! second, `j / √b`, is convex in b: its tangent at any b* lies below it, so with `j (3/2 - b / (2 b*)) / √b*` in its point
 //! the condition is linear and no less strict (the step by which sequential programs stay feasible: Debrouwere et al.
 //! 2013, Lee et al. 2024, arXiv 2404.07889). All conditions on (b, c, w) at a cell's start, middle and end are then
 //! half-spaces, and the set of (b, c) at a node from which the end can be reached is a convex polygon: the one of the
@@ -17,7 +17,7 @@
 //! At rest `b` rises as `s^(4/3)`, faster than any parabola: the first cell of a path has an even jerk in time, which leads to
 //! a point on the ray `c = 4 b / (3 length)`, and the last one likewise.
 //!
-//! Between the places that were looked at a limit may be exceeded a little. It is looked for in more places, and the motion
+//! Between the points that were looked at a limit may be exceeded a little. It is looked for in more points, and the motion
 //! made slower by as much; so is all of it where no way was found.
 
 use drawing::Segment;
@@ -34,7 +34,7 @@ const PASSES: usize = 4;
 /// Passes end that bring no more than this share of the time.
 const LEAST_GAIN: f64 = 1e-3;
 
-/// A motion that would have to be slowed down by more than this between the places that were looked at is planned anew with
+/// A motion that would have to be slowed down by more than this between the points that were looked at is planned anew with
 /// stricter limits where that is so.
 const EXCESS: f64 = 1.002;
 
@@ -76,9 +76,9 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     }
 }
 
-/// What a motor allows at one place of a path.
+/// What a motor allows at one point of a path.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct PointConstraints {
     /// Derivatives by s over the motors' limits: m' / v; m' / a, m'' / a; m' / j, m'' / j, m''' / j.
     speed: [f64; 2],
     acceleration: [[f64; 2]; 2],
@@ -87,7 +87,7 @@ struct Place {
     bend: f64,
 }
 
-impl Place {
+impl PointConstraints {
     fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
         let t = (s * piece.rate).clamp(0.0, 1.0);
         let pose: JointPos = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
@@ -132,7 +132,7 @@ struct Cell {
     start: f64,
     length: f64,
     /// At its start, middle and end.
-    places: [Place; 3],
+    points: [PointConstraints; 3],
     cap: f64,
     /// On turns and near them the pen's |p'| |u| + bend b may be no more than this; otherwise infinite.
     row_limit: f64,
@@ -173,7 +173,7 @@ impl Cell {
     fn conditions(&self) -> Vec<[f64; 4]> {
         let mut all = Vec::with_capacity(40);
         for (j, share) in SHARES.into_iter().enumerate() {
-            let (place, s) = (&self.places[j], share * self.length);
+            let (point, s) = (&self.points[j], share * self.length);
             // b there is b + s c + s²/2 w, c there is c + s w.
             let mut hold = |of_b: f64, of_c: f64, of_w: f64, room: f64| {
                 all.push([of_b, of_b * s + of_c, 0.5 * of_b * s * s + of_c * s + of_w, room]);
@@ -183,10 +183,10 @@ impl Cell {
             let tangent = (1.5 / self.aim[j].sqrt(), -0.5 / (self.aim[j] * self.aim[j].sqrt()));
             for k in 0..2 {
                 for sign in [1.0, -1.0] {
-                    let [m1, m2] = place.acceleration[k].map(|m| sign * m);
+                    let [m1, m2] = point.acceleration[k].map(|m| sign * m);
                     hold(m2, 0.5 * m1, 0.0, self.allowed.0);
-                    if place.jerk[k] != [0.0; 3] {
-                        let [m1, m2, m3] = place.jerk[k].map(|m| sign * m);
+                    if point.jerk[k] != [0.0; 3] {
+                        let [m1, m2, m3] = point.jerk[k].map(|m| sign * m);
                         let (room, slope) = (self.allowed.1 * tangent.0, self.allowed.1 * tangent.1);
                         hold(m3 - slope, 1.5 * m2, 0.5 * m1, room);
                     }
@@ -194,7 +194,7 @@ impl Cell {
             }
             if self.row_limit.is_finite() {
                 for sign in [1.0, -1.0] {
-                    hold(place.bend, 0.5 * sign * place.pen_speed, 0.0, self.row_limit);
+                    hold(point.bend, 0.5 * sign * point.pen_speed, 0.0, self.row_limit);
                 }
             }
         }
@@ -208,16 +208,16 @@ impl Cell {
         // With b there: c = 4 b / (3 h), u = c / 2, and the jerk of s is √b³ / (rest of this) by s = j t³/6.
         let jerk = JERK_OF_REST / (h * h);
         let mut most = self.cap;
-        for place in &self.places {
+        for point in &self.points {
             for k in 0..2 {
-                let [m1, m2] = place.acceleration[k].map(f64::abs);
+                let [m1, m2] = point.acceleration[k].map(f64::abs);
                 most = most.min(self.allowed.0 / (m1 * 2.0 / (3.0 * h) + m2));
-                let [m1, m2, m3] = place.jerk[k].map(f64::abs);
+                let [m1, m2, m3] = point.jerk[k].map(f64::abs);
                 let by = self.allowed.1 / (m1 * jerk + 2.0 * m2 / h + m3);
                 most = most.min(libm::cbrt(by * by));
             }
             if self.row_limit.is_finite() {
-                most = most.min(self.row_limit / (place.pen_speed * 2.0 / (3.0 * h) + place.bend));
+                most = most.min(self.row_limit / (point.pen_speed * 2.0 / (3.0 * h) + point.bend));
             }
         }
         most
@@ -234,7 +234,7 @@ fn ray(length: f64) -> f64 {
 }
 
 /// The path in cells short enough for one w each: by time, a fifth of what a motor needs to build up its acceleration, and
-/// ever shorter towards rest. Nothing if a place of it has no pose, which lifting the path would have found.
+/// ever shorter towards rest. Nothing if a point of it has no pose, which lifting the path would have found.
 fn cells(
     machine: &Machine,
     path: &JointPath,
@@ -275,21 +275,21 @@ fn cells(
             let wanted = wanted.min(0.25 * (total - s).max(0.0) + ramp).max(1e-6 * total);
             let length = if left < 1.5 * wanted { left } else { wanted };
             let start = cell.start + at;
-            let place = |share: f64| Place::at(machine, piece, start + share * length);
-            let places = [place(0.0)?, place(0.5)?, place(1.0)?];
-            let top = places.iter().map(|place| place.cap(cap)).fold(f64::INFINITY, f64::min);
+            let point = |share: f64| PointConstraints::at(machine, piece, start + share * length);
+            let points = [point(0.0)?, point(0.5)?, point(1.0)?];
+            let top = points.iter().map(|point| point.cap(cap)).fold(f64::INFINITY, f64::min);
             let row_limit = if cell.near_corner { rows } else { f64::INFINITY };
             let aim = SHARES.map(|share| {
                 let s = s + share * length;
                 let b = speeds.square(cell.piece, start + share * length).min(top);
                 let rest = s.min(total - s).max(0.1 * length);
-                places[1].aim(b, rest)
+                points[1].aim(b, rest)
             });
             cells.push(Cell {
                 piece: cell.piece,
                 start,
                 length,
-                places,
+                points,
                 cap: top,
                 row_limit,
                 aim,
@@ -319,17 +319,17 @@ fn floors(cells: &mut [Cell]) {
     let total: f64 = cells.iter().map(|cell| cell.length).sum();
     let mut at = 0.0_f64;
     for cell in cells.iter_mut() {
-        let most = |of: &dyn Fn(&Place) -> f64| cell.places.iter().map(of).fold(0.0, f64::max);
-        let turn = most(&|place| place.jerk[0][2].abs().max(place.jerk[1][2].abs()));
-        let bend = most(&|place| place.acceleration[0][1].abs().max(place.acceleration[1][1].abs()));
-        let rest = cell.places[0].aim(cell.cap, at.min(total - at));
+        let most = |of: &dyn Fn(&PointConstraints) -> f64| cell.points.iter().map(of).fold(0.0, f64::max);
+        let turn = most(&|point| point.jerk[0][2].abs().max(point.jerk[1][2].abs()));
+        let bend = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
+        let rest = cell.points[0].aim(cell.cap, at.min(total - at));
         cell.floor = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(cell.cap);
         at += cell.length;
     }
     let steps = |cell: &Cell, b: f64| {
-        let place = &cell.places[1];
-        let jerk = 1.0 / place.jerk[0][0].abs().max(place.jerk[1][0].abs());
-        let acceleration = 1.0 / place.acceleration[0][0].abs().max(place.acceleration[1][0].abs());
+        let point = &cell.points[1];
+        let jerk = 1.0 / point.jerk[0][0].abs().max(point.jerk[1][0].abs());
+        let acceleration = 1.0 / point.acceleration[0][0].abs().max(point.acceleration[1][0].abs());
         b + cell.length * acceleration.min((jerk * b.sqrt()).sqrt())
     };
     for k in 1..cells.len() {
@@ -341,7 +341,7 @@ fn floors(cells: &mut [Cell]) {
     }
 }
 
-impl Place {
+impl PointConstraints {
     /// A b* to begin with: no more than b, than what jerk allows on a turn, and than what it allows so near to rest.
     fn aim(&self, b: f64, to_rest: f64) -> f64 {
         let (mut turn, mut ramp) = (0.0_f64, 0.0_f64);
@@ -451,10 +451,10 @@ impl Landing {
 /// With the jerk j a motion that slows down by u needs the speed u² / (2 j) to end that, so `c² <= 8 j √b`: a convex
 /// set. These are corners of the one for twice the jerk, so that the chords between them take nothing away.
 fn around(cell: &Cell, floor: f64) -> Polygon {
-    let place = &cell.places[0];
-    let jerk = 1.0 / place.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
+    let point = &cell.points[0];
+    let jerk = 1.0 / point.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
     // And |½ m' c| <= 1 + |m''| b, whatever the jerk.
-    let c = place.acceleration.iter().map(|[m1, m2]| 2.0 * (1.0 + m2.abs() * cell.cap) / m1.abs());
+    let c = point.acceleration.iter().map(|[m1, m2]| 2.0 * (1.0 + m2.abs() * cell.cap) / m1.abs());
     let most = c.fold(f64::INFINITY, f64::min);
     let at = |share: &f64| {
         let b = share * cell.cap;
@@ -519,7 +519,7 @@ fn largest_into(set: &Polygon, cell: &Cell, [b, c]: State) -> Option<f64> {
     Some(if high >= low { high } else { 0.5 * (high + low) })
 }
 
-/// The phases through the states, slowed down until the limits hold between the places that were looked at too; and by how
+/// The phases through the states, slowed down until the limits hold between the points that were looked at too; and by how
 /// much each cell exceeded its limits on acceleration and jerk.
 fn emit(
     machine: &Machine,
@@ -541,7 +541,7 @@ fn emit(
             let phase = Phase::even(cell.piece, cell.start, speed, acceleration, duration);
             profile.push(Phase { jerk, ..phase });
             profile.limiting.jerk
-                [usize::from(cell.places[1].jerk[1][0].abs() > cell.places[1].jerk[0][0].abs())] += duration;
+                [usize::from(cell.points[1].jerk[1][0].abs() > cell.points[1].jerk[0][0].abs())] += duration;
             excesses.push((1.0, 1.0));
             continue;
         }
@@ -553,16 +553,16 @@ fn emit(
         let top = if from[1] > 0.0 && to[1] < 0.0 { from[0] - 0.5 * from[1] * from[1] / w } else { 0.0 };
         let speed = from[0].max(to[0]).max(top) / cell.cap;
         let shares = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0].map(|share| {
-            let place = match share {
-                0.0 => cell.places[0],
-                0.5 => cell.places[1],
-                1.0 => cell.places[2],
-                // The curve is within reach all along, so there always is a place.
+            let point = match share {
+                0.0 => cell.points[0],
+                0.5 => cell.points[1],
+                1.0 => cell.points[2],
+                // The curve is within reach all along, so there always is a point.
                 _ => {
-                    Place::at(machine, &section[cell.piece], cell.start + share * h).unwrap_or(cell.places[1])
+                    PointConstraints::at(machine, &section[cell.piece], cell.start + share * h).unwrap_or(cell.points[1])
                 }
             };
-            place.shares(cell.state(from, w, share), w)
+            point.shares(cell.state(from, w, share), w)
         });
         let excess = (peak(shares.map(|share| share.0)), peak(shares.map(|share| share.1)));
         limit(cell, from, to, excess, phase.duration, &mut profile);
@@ -585,26 +585,26 @@ fn peak<const N: usize>(samples: [f64; N]) -> f64 {
 /// Books the time of a cell to what is nearest to its limit.
 fn limit(cell: &Cell, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
     let limiting = &mut profile.limiting;
-    let place = &cell.places[1];
+    let point = &cell.points[1];
     let w = (to[1] - from[1]) / cell.length;
     let [b, c] = cell.state(from, w, 0.5);
     let speed = from[0].max(to[0]) / cell.cap;
     if speed >= excess.0.max(excess.1) {
-        let fastest = [0, 1].map(|k| place.speed[k] * place.speed[k] * cell.cap);
+        let fastest = [0, 1].map(|k| point.speed[k] * point.speed[k] * cell.cap);
         if fastest[0].max(fastest[1]) > 0.999 {
             limiting.speed[usize::from(fastest[1] > fastest[0])] += duration;
-        } else if place.bend * cell.cap > 0.999 * cell.row_limit {
+        } else if point.bend * cell.cap > 0.999 * cell.row_limit {
             limiting.rows += duration;
         } else {
             limiting.pen += duration;
         }
     } else if excess.1 >= excess.0 {
         let of = |[m1, m2, m3]: [f64; 3]| (0.5 * m1 * w + 1.5 * m2 * c + m3 * b).abs();
-        limiting.jerk[usize::from(of(place.jerk[1]) > of(place.jerk[0]))] += duration;
+        limiting.jerk[usize::from(of(point.jerk[1]) > of(point.jerk[0]))] += duration;
     } else {
         let of = |[m1, m2]: [f64; 2]| (0.5 * m1 * c + m2 * b).abs();
-        let k = usize::from(of(place.acceleration[1]) > of(place.acceleration[0]));
-        let [m1, m2] = place.acceleration[k];
+        let k = usize::from(of(point.acceleration[1]) > of(point.acceleration[0]));
+        let [m1, m2] = point.acceleration[k];
         let turning = (m2 * b).abs() > (0.5 * m1 * c).abs();
         *(if turning { &mut limiting.turning[k] } else { &mut limiting.acceleration[k] }) += duration;
     }
