@@ -6,15 +6,15 @@
 //! acceleration  |½ m' c + m'' b|                          <= a
 //! jerk          |½ m' w + 3/2 m'' c + m''' b|  √b         <= j
 //! ```
-//! `w` is constant on a cell, so b is a parabola and the motion `d²s/dt² = c/2 + w s/2`. Divided by √b the right side of the
+//! `w` is constant on a interval, so b is a parabola and the motion `d²s/dt² = c/2 + w s/2`. Divided by √b the right side of the
 //! second, `j / √b`, is convex in b: its tangent at any b* lies below it, so with `j (3/2 - b / (2 b*)) / √b*` in its point
 //! the condition is linear and no less strict (the step by which sequential programs stay feasible: Debrouwere et al.
-//! 2013, Lee et al. 2024, arXiv 2404.07889). All conditions on (b, c, w) at a cell's start, middle and end are then
+//! 2013, Lee et al. 2024, arXiv 2404.07889). All conditions on (b, c, w) at a interval's start, middle and end are then
 //! half-spaces, and the set of (b, c) at a node from which the end can be reached is a convex polygon: the one of the
-//! next node, carried back through the cell, with w projected out (every upper bound of w against every lower one). Forward,
+//! next node, carried back through the interval, with w projected out (every upper bound of w against every lower one). Forward,
 //! the largest w at each node that stays within the next polygon. Then again with b* at the speeds found, while that gains time.
 //!
-//! At rest `b` rises as `s^(4/3)`, faster than any parabola: the first cell of a path has an even jerk in time, which leads to
+//! At rest `b` rises as `s^(4/3)`, faster than any parabola: the first interval of a path has an even jerk in time, which leads to
 //! a point on the ray `c = 4 b / (3 length)`, and the last one likewise.
 //!
 //! Between the points that were looked at a limit may be exceeded a little. It is looked for in more points, and the motion
@@ -47,15 +47,15 @@ pub(super) fn applies(machine: &Machine) -> bool {
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     match &path.course {
         Course::Travel(..) => {
-            straight::profile(machine, path.cells[0].first[0], cap.pen / path.cells[0].pen_speed)
+            straight::profile(machine, path.intervals[0].first[0], cap.pen / path.intervals[0].pen_speed)
         }
         Course::Drawn(_, section) => {
             let fastest = acceleration::profile(machine, path, cap);
-            let mut cells = cells(machine, path, section, cap, &fastest).unwrap_or_default();
+            let mut intervals = intervals(machine, path, section, cap, &fastest).unwrap_or_default();
             let mut best: Option<Profile> = None;
             for _ in 0..PASSES {
-                let Some(states) = solve(&cells) else { break };
-                let (found, excess) = emit(machine, section, &cells, &states);
+                let Some(states) = solve(&intervals) else { break };
+                let (found, excess) = emit(machine, section, &intervals, &states);
                 if !found.duration.is_finite() {
                     break;
                 }
@@ -66,9 +66,9 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
                 if gain < LEAST_GAIN && excess.iter().all(|excess| *excess == (1.0, 1.0)) {
                     break;
                 }
-                for ((cell, state), excess) in cells.iter_mut().zip(states.windows(2)).zip(excess) {
-                    cell.aim(state[0], state[1]);
-                    cell.tighten(excess);
+                for ((interval, state), excess) in intervals.iter_mut().zip(states.windows(2)).zip(excess) {
+                    interval.aim(state[0], state[1]);
+                    interval.tighten(excess);
                 }
             }
             best.unwrap_or_else(|| slowed_until_smooth(machine, fastest, cap))
@@ -127,7 +127,7 @@ type State = [f64; 2];
 
 /// A stretch of a path with one w.
 #[derive(Clone, Debug)]
-struct Cell {
+struct JerkInterval {
     piece: usize,
     start: f64,
     length: f64,
@@ -146,7 +146,7 @@ struct Cell {
 
 const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
 
-impl Cell {
+impl JerkInterval {
     /// b and c at a share of it.
     fn state(&self, from: State, w: f64, share: f64) -> State {
         let s = share * self.length;
@@ -201,8 +201,8 @@ impl Cell {
         all
     }
 
-    /// The largest b that an even jerk in time from rest may lead to at the other end of the cell: all limits grow with
-    /// b there, so their worst over the cell is at that end.
+    /// The largest b that an even jerk in time from rest may lead to at the other end of the interval: all limits grow with
+    /// b there, so their worst over the interval is at that end.
     fn most_from_rest(&self) -> f64 {
         let h = self.length;
         // With b there: c = 4 b / (3 h), u = c / 2, and the jerk of s is √b³ / (rest of this) by s = j t³/6.
@@ -228,44 +228,44 @@ impl Cell {
 /// `(t⁶ j³ / 36) (8 / (j³ t⁶)) = 2/9`.
 const JERK_OF_REST: f64 = 2.0 / 9.0;
 
-/// c over b at the end of a cell that begins at rest.
+/// c over b at the end of a interval that begins at rest.
 fn ray(length: f64) -> f64 {
     4.0 / (3.0 * length)
 }
 
-/// The path in cells short enough for one w each: by time, a fifth of what a motor needs to build up its acceleration, and
+/// The path in intervals short enough for one w each: by time, a fifth of what a motor needs to build up its acceleration, and
 /// ever shorter towards rest. Nothing if a point of it has no pose, which lifting the path would have found.
-fn cells(
+fn intervals(
     machine: &Machine,
     path: &JointPath,
     section: &[Piece],
     cap: &SpeedCap,
     fastest: &Profile,
-) -> Option<Vec<Cell>> {
+) -> Option<Vec<JerkInterval>> {
     let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
     let build_up = machine
         .motors()
         .iter()
         .filter_map(|motor| motor.max_jerk_ticks_s3.map(|jerk| motor.max_acceleration_ticks_s2 / jerk));
     let build_up = build_up.fold(0.0, f64::max);
-    let total: f64 = path.cells.iter().map(|cell| cell.length).sum();
+    let total: f64 = path.intervals.iter().map(|interval| interval.length).sum();
     let mut speeds = Speeds { phases: &fastest.phases, at: 0 };
-    let mut cells = Vec::new();
+    let mut intervals = Vec::new();
     let mut done = 0.0;
-    for cell in &path.cells {
-        let piece = &section[cell.piece];
+    for interval in &path.intervals {
+        let piece = &section[interval.piece];
         let acceleration = machine
             .motors()
             .iter()
             .enumerate()
-            .map(|(k, motor)| motor.max_acceleration_ticks_s2 / cell.first[1][k].abs());
+            .map(|(k, motor)| motor.max_acceleration_ticks_s2 / interval.first[1][k].abs());
         let ramp = 0.02 * acceleration.fold(f64::INFINITY, f64::min) * build_up * build_up;
-        let longest = cell.length / if matches!(piece.curve, Segment::Line(_)) { 1.0 } else { 2.0 };
+        let longest = interval.length / if matches!(piece.curve, Segment::Line(_)) { 1.0 } else { 2.0 };
         let mut at = 0.0;
-        while let Some(left) = left_of(cell.length, at) {
+        while let Some(left) = left_of(interval.length, at) {
             let s = done + at;
             let to_rest = s.min(total - s);
-            let speed = speeds.square(cell.piece, cell.start + at).sqrt();
+            let speed = speeds.square(interval.piece, interval.start + at).sqrt();
             let wanted = (0.2 * speed * build_up)
                 .max(ramp)
                 .min(0.25 * (to_rest + 4.0 * ramp))
@@ -274,19 +274,19 @@ fn cells(
             // The last steps towards rest as short as the first away from it.
             let wanted = wanted.min(0.25 * (total - s).max(0.0) + ramp).max(1e-6 * total);
             let length = if left < 1.5 * wanted { left } else { wanted };
-            let start = cell.start + at;
+            let start = interval.start + at;
             let point = |share: f64| PointConstraints::at(machine, piece, start + share * length);
             let points = [point(0.0)?, point(0.5)?, point(1.0)?];
             let top = points.iter().map(|point| point.cap(cap)).fold(f64::INFINITY, f64::min);
-            let row_limit = if cell.near_corner { rows } else { f64::INFINITY };
+            let row_limit = if interval.near_corner { rows } else { f64::INFINITY };
             let aim = SHARES.map(|share| {
                 let s = s + share * length;
-                let b = speeds.square(cell.piece, start + share * length).min(top);
+                let b = speeds.square(interval.piece, start + share * length).min(top);
                 let rest = s.min(total - s).max(0.1 * length);
                 points[1].aim(b, rest)
             });
-            cells.push(Cell {
-                piece: cell.piece,
+            intervals.push(JerkInterval {
+                piece: interval.piece,
                 start,
                 length,
                 points,
@@ -298,13 +298,13 @@ fn cells(
             });
             at += length;
         }
-        done += cell.length;
+        done += interval.length;
     }
-    floors(&mut cells);
-    Some(cells)
+    floors(&mut intervals);
+    Some(intervals)
 }
 
-/// What is left of a length, unless that is but a rounding error: that would be a cell on which no law can be found.
+/// What is left of a length, unless that is but a rounding error: that would be a interval on which no law can be found.
 fn left_of(length: f64, at: f64) -> Option<f64> {
     let left = length - at;
     (left > 1e-9 * length).then_some(left)
@@ -315,29 +315,29 @@ fn left_of(length: f64, at: f64) -> Option<f64> {
 ///
 /// Going as fast as possible from the start would brake for a turn so late that the pen nearly stands when the brake is
 /// released. Speeds below a share of these are therefore not taken.
-fn floors(cells: &mut [Cell]) {
-    let total: f64 = cells.iter().map(|cell| cell.length).sum();
+fn floors(intervals: &mut [JerkInterval]) {
+    let total: f64 = intervals.iter().map(|interval| interval.length).sum();
     let mut at = 0.0_f64;
-    for cell in cells.iter_mut() {
-        let most = |of: &dyn Fn(&PointConstraints) -> f64| cell.points.iter().map(of).fold(0.0, f64::max);
+    for interval in intervals.iter_mut() {
+        let most = |of: &dyn Fn(&PointConstraints) -> f64| interval.points.iter().map(of).fold(0.0, f64::max);
         let turn = most(&|point| point.jerk[0][2].abs().max(point.jerk[1][2].abs()));
         let bend = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
-        let rest = cell.points[0].aim(cell.cap, at.min(total - at));
-        cell.floor = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(cell.cap);
-        at += cell.length;
+        let rest = interval.points[0].aim(interval.cap, at.min(total - at));
+        interval.floor = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(interval.cap);
+        at += interval.length;
     }
-    let steps = |cell: &Cell, b: f64| {
-        let point = &cell.points[1];
+    let steps = |interval: &JerkInterval, b: f64| {
+        let point = &interval.points[1];
         let jerk = 1.0 / point.jerk[0][0].abs().max(point.jerk[1][0].abs());
         let acceleration = 1.0 / point.acceleration[0][0].abs().max(point.acceleration[1][0].abs());
-        b + cell.length * acceleration.min((jerk * b.sqrt()).sqrt())
+        b + interval.length * acceleration.min((jerk * b.sqrt()).sqrt())
     };
-    for k in 1..cells.len() {
-        cells[k].floor =
-            cells[k].floor.min(steps(&cells[k - 1], cells[k - 1].floor.max(1e-9 * cells[k].cap)));
+    for k in 1..intervals.len() {
+        intervals[k].floor =
+            intervals[k].floor.min(steps(&intervals[k - 1], intervals[k - 1].floor.max(1e-9 * intervals[k].cap)));
     }
-    for k in (1..cells.len()).rev() {
-        cells[k - 1].floor = cells[k - 1].floor.min(steps(&cells[k - 1], cells[k].floor));
+    for k in (1..intervals.len()).rev() {
+        intervals[k - 1].floor = intervals[k - 1].floor.min(steps(&intervals[k - 1], intervals[k].floor));
     }
 }
 
@@ -376,44 +376,44 @@ impl Speeds<'_> {
 }
 
 /// The states at all nodes; nothing where no way is found.
-fn solve(cells: &[Cell]) -> Option<Vec<State>> {
-    [0.5, 0.1, 0.0].into_iter().find_map(|floor| solve_above(cells, floor))
+fn solve(intervals: &[JerkInterval]) -> Option<Vec<State>> {
+    [0.5, 0.1, 0.0].into_iter().find_map(|floor| solve_above(intervals, floor))
 }
 
 /// The states at all nodes, with b no less than so much of the floors.
-fn solve_above(cells: &[Cell], floor: f64) -> Option<Vec<State>> {
-    let count = cells.len();
+fn solve_above(intervals: &[JerkInterval], floor: f64) -> Option<Vec<State>> {
+    let count = intervals.len();
     if count < 4 {
         return None;
     }
-    let (last, last_but_one) = (&cells[count - 1], &cells[count - 2]);
-    // Sets at the starts of cells 1 to count - 2; from that of the last but one the last one's ray is met exactly.
+    let (last, last_but_one) = (&intervals[count - 1], &intervals[count - 2]);
+    // Sets at the starts of intervals 1 to count - 2; from that of the last but one the last one's ray is met exactly.
     let landing = Landing::new(last_but_one, ray(last.length));
     let mut sets = vec![Polygon::default(); count - 1];
     sets[count - 2] = landing.set(last_but_one, floor, last.most_from_rest());
     for k in (1..count - 2).rev() {
-        sets[k] = before(&cells[k], floor, &sets[k + 1]);
+        sets[k] = before(&intervals[k], floor, &sets[k + 1]);
         if sets[k].0.is_empty() {
             return None;
         }
     }
     // From rest, as far along the ray as the set allows.
-    let start = sets[1].farthest(ray(cells[0].length))?.min(cells[0].most_from_rest());
+    let start = sets[1].farthest(ray(intervals[0].length))?.min(intervals[0].most_from_rest());
     if start <= 0.0 {
         return None;
     }
-    let mut states = vec![[0.0, 0.0], [start, ray(cells[0].length) * start]];
+    let mut states = vec![[0.0, 0.0], [start, ray(intervals[0].length) * start]];
     for k in 1..count - 1 {
         let from = states[k];
-        let w = if k == count - 2 { landing.w(from) } else { largest_into(&sets[k + 1], &cells[k], from)? };
-        let to = cells[k].state(from, w, 1.0);
+        let w = if k == count - 2 { landing.w(from) } else { largest_into(&sets[k + 1], &intervals[k], from)? };
+        let to = intervals[k].state(from, w, 1.0);
         states.push([to[0].max(0.0), to[1]]);
     }
     states.push([0.0, 0.0]);
     states.iter().flatten().all(|x| x.is_finite()).then_some(states)
 }
 
-/// The cell before the last: its w is such that it ends on the ray on which an even jerk leads to rest.
+/// The interval before the last: its w is such that it ends on the ray on which an even jerk leads to rest.
 struct Landing {
     /// w = x b + y c.
     w: [f64; 2],
@@ -423,8 +423,8 @@ struct Landing {
 
 impl Landing {
     /// From `c + w h = -g (b + c h + w h²/2)`.
-    fn new(cell: &Cell, g: f64) -> Self {
-        let h = cell.length;
+    fn new(interval: &JerkInterval, g: f64) -> Self {
+        let h = interval.length;
         let below = h + 0.5 * g * h * h;
         let w = [-g / below, -(1.0 + g * h) / below];
         Self { w, end: [1.0 + 0.5 * h * h * w[0], h + 0.5 * h * h * w[1]] }
@@ -434,9 +434,9 @@ impl Landing {
         self.w[0] * b + self.w[1] * c
     }
 
-    fn set(&self, cell: &Cell, floor: f64, most: f64) -> Polygon {
-        let mut set = around(cell, floor);
-        for [x, y, z, room] in cell.conditions() {
+    fn set(&self, interval: &JerkInterval, floor: f64, most: f64) -> Polygon {
+        let mut set = around(interval, floor);
+        for [x, y, z, room] in interval.conditions() {
             set.clip(x + z * self.w[0], y + z * self.w[1], room);
         }
         set.clip(self.end[0], self.end[1], most);
@@ -445,19 +445,19 @@ impl Landing {
     }
 }
 
-/// All states at a cell's start that could come from rest and go to rest.
+/// All states at a interval's start that could come from rest and go to rest.
 ///
 /// Under √b the jerk's condition vanishes with b: what it forbids there must be said apart, or speeds would bounce off 0.
 /// With the jerk j a motion that slows down by u needs the speed u² / (2 j) to end that, so `c² <= 8 j √b`: a convex
 /// set. These are corners of the one for twice the jerk, so that the chords between them take nothing away.
-fn around(cell: &Cell, floor: f64) -> Polygon {
-    let point = &cell.points[0];
+fn around(interval: &JerkInterval, floor: f64) -> Polygon {
+    let point = &interval.points[0];
     let jerk = 1.0 / point.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
     // And |½ m' c| <= 1 + |m''| b, whatever the jerk.
-    let c = point.acceleration.iter().map(|[m1, m2]| 2.0 * (1.0 + m2.abs() * cell.cap) / m1.abs());
+    let c = point.acceleration.iter().map(|[m1, m2]| 2.0 * (1.0 + m2.abs() * interval.cap) / m1.abs());
     let most = c.fold(f64::INFINITY, f64::min);
     let at = |share: &f64| {
-        let b = share * cell.cap;
+        let b = share * interval.cap;
         [b, (16.0 * jerk * b.sqrt()).sqrt().min(most)]
     };
     let levels = [1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.4, 1.0];
@@ -465,15 +465,15 @@ fn around(cell: &Cell, floor: f64) -> Polygon {
     corners.extend(levels.iter().map(at).map(|[b, c]| [b, -c]));
     corners.extend(levels.iter().rev().map(at));
     let mut set = Polygon(corners);
-    set.clip(-1.0, 0.0, -floor * cell.floor);
+    set.clip(-1.0, 0.0, -floor * interval.floor);
     set
 }
 
-/// The states at a cell's start from which some w leads into `next`.
-fn before(cell: &Cell, floor: f64, next: &Polygon) -> Polygon {
-    let mut set = around(cell, floor);
+/// The states at a interval's start from which some w leads into `next`.
+fn before(interval: &JerkInterval, floor: f64, next: &Polygon) -> Polygon {
+    let mut set = around(interval, floor);
     let (mut upper, mut lower) = (Vec::with_capacity(40), Vec::with_capacity(40));
-    for [x, y, z, room] in cell.conditions().into_iter().chain(through(cell, next)) {
+    for [x, y, z, room] in interval.conditions().into_iter().chain(through(interval, next)) {
         if z > 0.0 {
             upper.push([x / z, y / z, room / z]);
         } else if z < 0.0 {
@@ -494,17 +494,17 @@ fn before(cell: &Cell, floor: f64, next: &Polygon) -> Polygon {
     set
 }
 
-/// The conditions on a state at a cell's start and w for getting into a set through the cell.
-fn through(cell: &Cell, set: &Polygon) -> impl Iterator<Item = [f64; 4]> {
-    let h = cell.length;
+/// The conditions on a state at a interval's start and w for getting into a set through the interval.
+fn through(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f64; 4]> {
+    let h = interval.length;
     // b at the end is b + h c + h²/2 w, c there is c + h w.
     set.edges().map(move |[x, y, room]| [x, x * h + y, 0.5 * x * h * h + y * h, room])
 }
 
-/// The largest w by which a cell leads from a state into a set; nothing if there is none at all.
-fn largest_into(set: &Polygon, cell: &Cell, [b, c]: State) -> Option<f64> {
+/// The largest w by which a interval leads from a state into a set; nothing if there is none at all.
+fn largest_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    for [x, y, z, room] in cell.conditions().into_iter().chain(through(cell, set)) {
+    for [x, y, z, room] in interval.conditions().into_iter().chain(through(interval, set)) {
         let left = room - x * b - y * c;
         if z > 0.0 {
             high = high.min(left / z);
@@ -520,52 +520,52 @@ fn largest_into(set: &Polygon, cell: &Cell, [b, c]: State) -> Option<f64> {
 }
 
 /// The phases through the states, slowed down until the limits hold between the points that were looked at too; and by how
-/// much each cell exceeded its limits on acceleration and jerk.
+/// much each interval exceeded its limits on acceleration and jerk.
 fn emit(
     machine: &Machine,
     section: &[Piece],
-    cells: &[Cell],
+    intervals: &[JerkInterval],
     states: &[State],
 ) -> (Profile, Vec<(f64, f64)>) {
     let mut profile = Profile::new();
-    let mut excesses = Vec::with_capacity(cells.len());
+    let mut excesses = Vec::with_capacity(intervals.len());
     let mut slower = 1.0_f64;
-    for (k, (cell, state)) in cells.iter().zip(states.windows(2)).enumerate() {
+    for (k, (interval, state)) in intervals.iter().zip(states.windows(2)).enumerate() {
         let (from, to) = (state[0], state[1]);
-        let h = cell.length;
-        if k == 0 || k + 1 == cells.len() {
+        let h = interval.length;
+        if k == 0 || k + 1 == intervals.len() {
             let b = from[0].max(to[0]);
             let jerk = JERK_OF_REST * b * b.sqrt() / (h * h);
             let duration = libm::cbrt(6.0 * h / jerk);
             let (speed, acceleration) = if k == 0 { (0.0, 0.0) } else { (b.sqrt(), -jerk * duration) };
-            let phase = Phase::even(cell.piece, cell.start, speed, acceleration, duration);
+            let phase = Phase::even(interval.piece, interval.start, speed, acceleration, duration);
             profile.push(Phase { jerk, ..phase });
             profile.limiting.jerk
-                [usize::from(cell.points[1].jerk[1][0].abs() > cell.points[1].jerk[0][0].abs())] += duration;
+                [usize::from(interval.points[1].jerk[1][0].abs() > interval.points[1].jerk[0][0].abs())] += duration;
             excesses.push((1.0, 1.0));
             continue;
         }
         let w = (to[1] - from[1]) / h;
         let phase =
-            Phase::even(cell.piece, cell.start, from[0].sqrt(), 0.5 * from[1], duration(h, from, to, w));
+            Phase::even(interval.piece, interval.start, from[0].sqrt(), 0.5 * from[1], duration(h, from, to, w));
         profile.push(Phase { growth: 0.5 * w, ..phase });
         // b is largest at an end, or where c is 0.
         let top = if from[1] > 0.0 && to[1] < 0.0 { from[0] - 0.5 * from[1] * from[1] / w } else { 0.0 };
-        let speed = from[0].max(to[0]).max(top) / cell.cap;
+        let speed = from[0].max(to[0]).max(top) / interval.cap;
         let shares = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0].map(|share| {
             let point = match share {
-                0.0 => cell.points[0],
-                0.5 => cell.points[1],
-                1.0 => cell.points[2],
+                0.0 => interval.points[0],
+                0.5 => interval.points[1],
+                1.0 => interval.points[2],
                 // The curve is within reach all along, so there always is a point.
                 _ => {
-                    PointConstraints::at(machine, &section[cell.piece], cell.start + share * h).unwrap_or(cell.points[1])
+                    PointConstraints::at(machine, &section[interval.piece], interval.start + share * h).unwrap_or(interval.points[1])
                 }
             };
-            point.shares(cell.state(from, w, share), w)
+            point.shares(interval.state(from, w, share), w)
         });
         let excess = (peak(shares.map(|share| share.0)), peak(shares.map(|share| share.1)));
-        limit(cell, from, to, excess, phase.duration, &mut profile);
+        limit(interval, from, to, excess, phase.duration, &mut profile);
         slower = slower.max(excess.0.sqrt()).max(libm::cbrt(excess.1)).max(speed.sqrt());
         let beyond = |share: f64| if share > EXCESS { share } else { 1.0 };
         excesses.push((beyond(excess.0), beyond(excess.1)));
@@ -582,18 +582,18 @@ fn peak<const N: usize>(samples: [f64; N]) -> f64 {
     samples.windows(3).map(top).fold(samples[0].max(samples[N - 1]), f64::max)
 }
 
-/// Books the time of a cell to what is nearest to its limit.
-fn limit(cell: &Cell, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
+/// Books the time of a interval to what is nearest to its limit.
+fn limit(interval: &JerkInterval, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
     let limiting = &mut profile.limiting;
-    let point = &cell.points[1];
-    let w = (to[1] - from[1]) / cell.length;
-    let [b, c] = cell.state(from, w, 0.5);
-    let speed = from[0].max(to[0]) / cell.cap;
+    let point = &interval.points[1];
+    let w = (to[1] - from[1]) / interval.length;
+    let [b, c] = interval.state(from, w, 0.5);
+    let speed = from[0].max(to[0]) / interval.cap;
     if speed >= excess.0.max(excess.1) {
-        let fastest = [0, 1].map(|k| point.speed[k] * point.speed[k] * cell.cap);
+        let fastest = [0, 1].map(|k| point.speed[k] * point.speed[k] * interval.cap);
         if fastest[0].max(fastest[1]) > 0.999 {
             limiting.speed[usize::from(fastest[1] > fastest[0])] += duration;
-        } else if point.bend * cell.cap > 0.999 * cell.row_limit {
+        } else if point.bend * interval.cap > 0.999 * interval.row_limit {
             limiting.rows += duration;
         } else {
             limiting.pen += duration;
@@ -649,7 +649,7 @@ mod tests {
     use super::left_of;
 
     proptest! {
-        /// A cell of 1e-17 mm once stood at the end of a piece, and the plan of examples/rosette.hpgl took 31 minutes instead of 13.
+        /// A interval of 1e-17 mm once stood at the end of a piece, and the plan of examples/rosette.hpgl took 31 minutes instead of 13.
         #[test]
         fn a_rounding_error_is_no_cell(length in 1e-3..1e3f64, share in 0.0..1.0f64) {
             let at = share * length;
