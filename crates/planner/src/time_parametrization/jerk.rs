@@ -67,7 +67,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
                     break;
                 }
                 for ((interval, state), excess) in intervals.iter_mut().zip(states.windows(2)).zip(excess) {
-                    interval.aim(state[0], state[1]);
+                    interval.linearize_at(state[0], state[1]);
                     interval.tighten(excess);
                 }
             }
@@ -137,7 +137,7 @@ struct JerkInterval {
     /// On turns and near them the pen's |p'| |u| + bend b may be no more than this; otherwise infinite.
     row_limit: f64,
     /// b* at its start, middle and end.
-    aim: [f64; 3],
+    tangent_points: [f64; 3],
     /// Shares of the limits on acceleration and jerk that are used.
     allowed: (f64, f64),
     /// A b that its start can well be passed with, see [`floors`].
@@ -154,11 +154,11 @@ impl JerkInterval {
     }
 
     /// Puts b* where the speed is now.
-    fn aim(&mut self, from: State, to: State) {
+    fn linearize_at(&mut self, from: State, to: State) {
         let w = (to[1] - from[1]) / self.length;
         let speeds = SHARES.map(|share| self.state(from, w, share)[0]);
-        for (aim, b) in self.aim.iter_mut().zip(speeds) {
-            *aim = b.max(1e-3 * *aim);
+        for (tangent_point, b) in self.tangent_points.iter_mut().zip(speeds) {
+            *tangent_point = b.max(1e-3 * *tangent_point);
         }
     }
 
@@ -180,7 +180,7 @@ impl JerkInterval {
             };
             hold(1.0, 0.0, 0.0, self.cap);
             hold(-1.0, 0.0, 0.0, 0.0);
-            let tangent = (1.5 / self.aim[j].sqrt(), -0.5 / (self.aim[j] * self.aim[j].sqrt()));
+            let tangent = (1.5 / self.tangent_points[j].sqrt(), -0.5 / (self.tangent_points[j] * self.tangent_points[j].sqrt()));
             for k in 0..2 {
                 for sign in [1.0, -1.0] {
                     let [m1, m2] = point.acceleration[k].map(|m| sign * m);
@@ -279,11 +279,11 @@ fn intervals(
             let points = [point(0.0)?, point(0.5)?, point(1.0)?];
             let top = points.iter().map(|point| point.cap(cap)).fold(f64::INFINITY, f64::min);
             let row_limit = if interval.near_corner { rows } else { f64::INFINITY };
-            let aim = SHARES.map(|share| {
+            let tangent_points = SHARES.map(|share| {
                 let s = s + share * length;
                 let b = speeds.square(interval.piece, start + share * length).min(top);
                 let rest = s.min(total - s).max(0.1 * length);
-                points[1].aim(b, rest)
+                points[1].initial_tangent_point(b, rest)
             });
             intervals.push(JerkInterval {
                 piece: interval.piece,
@@ -292,7 +292,7 @@ fn intervals(
                 points,
                 cap: top,
                 row_limit,
-                aim,
+                tangent_points,
                 allowed: (1.0, 1.0),
                 floor: 0.0,
             });
@@ -322,7 +322,7 @@ fn floors(intervals: &mut [JerkInterval]) {
         let most = |of: &dyn Fn(&PointConstraints) -> f64| interval.points.iter().map(of).fold(0.0, f64::max);
         let turn = most(&|point| point.jerk[0][2].abs().max(point.jerk[1][2].abs()));
         let bend = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
-        let rest = interval.points[0].aim(interval.cap, at.min(total - at));
+        let rest = interval.points[0].initial_tangent_point(interval.cap, at.min(total - at));
         interval.floor = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(interval.cap);
         at += interval.length;
     }
@@ -343,7 +343,7 @@ fn floors(intervals: &mut [JerkInterval]) {
 
 impl PointConstraints {
     /// A b* to begin with: no more than b, than what jerk allows on a turn, and than what it allows so near to rest.
-    fn aim(&self, b: f64, to_rest: f64) -> f64 {
+    fn initial_tangent_point(&self, b: f64, to_rest: f64) -> f64 {
         let (mut turn, mut ramp) = (0.0_f64, 0.0_f64);
         for [m1, _, m3] in self.jerk {
             (turn, ramp) = (turn.max(m3.abs()), ramp.max(m1.abs()));
