@@ -140,8 +140,8 @@ struct JerkInterval {
     tangent_points: [f64; 3],
     /// Shares of the limits on acceleration and jerk that are used.
     allowed: (f64, f64),
-    /// A b that its start can well be passed with, see [`floors`].
-    floor: f64,
+    /// A b that its start can well be passed with, see [`set_lower_bounds`].
+    lower_bound: f64,
 }
 
 const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
@@ -294,13 +294,13 @@ fn intervals(
                 row_limit,
                 tangent_points,
                 allowed: (1.0, 1.0),
-                floor: 0.0,
+                lower_bound: 0.0,
             });
             at += length;
         }
         done += interval.length;
     }
-    floors(&mut intervals);
+    set_lower_bounds(&mut intervals);
     Some(intervals)
 }
 
@@ -315,7 +315,7 @@ fn left_of(length: f64, at: f64) -> Option<f64> {
 ///
 /// Going as fast as possible from the start would brake for a turn so late that the pen nearly stands when the brake is
 /// released. Speeds below a share of these are therefore not taken.
-fn floors(intervals: &mut [JerkInterval]) {
+fn set_lower_bounds(intervals: &mut [JerkInterval]) {
     let total: f64 = intervals.iter().map(|interval| interval.length).sum();
     let mut at = 0.0_f64;
     for interval in intervals.iter_mut() {
@@ -323,7 +323,7 @@ fn floors(intervals: &mut [JerkInterval]) {
         let turn = most(&|point| point.jerk[0][2].abs().max(point.jerk[1][2].abs()));
         let bend = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
         let rest = interval.points[0].initial_tangent_point(interval.cap, at.min(total - at));
-        interval.floor = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(interval.cap);
+        interval.lower_bound = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(interval.cap);
         at += interval.length;
     }
     let steps = |interval: &JerkInterval, b: f64| {
@@ -333,11 +333,11 @@ fn floors(intervals: &mut [JerkInterval]) {
         b + interval.length * acceleration.min((jerk * b.sqrt()).sqrt())
     };
     for k in 1..intervals.len() {
-        intervals[k].floor =
-            intervals[k].floor.min(steps(&intervals[k - 1], intervals[k - 1].floor.max(1e-9 * intervals[k].cap)));
+        intervals[k].lower_bound =
+            intervals[k].lower_bound.min(steps(&intervals[k - 1], intervals[k - 1].lower_bound.max(1e-9 * intervals[k].cap)));
     }
     for k in (1..intervals.len()).rev() {
-        intervals[k - 1].floor = intervals[k - 1].floor.min(steps(&intervals[k - 1], intervals[k].floor));
+        intervals[k - 1].lower_bound = intervals[k - 1].lower_bound.min(steps(&intervals[k - 1], intervals[k].lower_bound));
     }
 }
 
@@ -377,11 +377,11 @@ impl Speeds<'_> {
 
 /// The states at all nodes; nothing where no way is found.
 fn solve(intervals: &[JerkInterval]) -> Option<Vec<State>> {
-    [0.5, 0.1, 0.0].into_iter().find_map(|floor| solve_above(intervals, floor))
+    [0.5, 0.1, 0.0].into_iter().find_map(|bound_share| solve_above(intervals, bound_share))
 }
 
-/// The states at all nodes, with b no less than so much of the floors.
-fn solve_above(intervals: &[JerkInterval], floor: f64) -> Option<Vec<State>> {
+/// The states at all nodes, with b no less than so much of the set_lower_bounds.
+fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State>> {
     let count = intervals.len();
     if count < 4 {
         return None;
@@ -390,9 +390,9 @@ fn solve_above(intervals: &[JerkInterval], floor: f64) -> Option<Vec<State>> {
     // Sets at the starts of intervals 1 to count - 2; from that of the last but one the last one's ray is met exactly.
     let landing = Landing::new(last_but_one, ray(last.length));
     let mut sets = vec![Polygon::default(); count - 1];
-    sets[count - 2] = landing.set(last_but_one, floor, last.most_from_rest());
+    sets[count - 2] = landing.set(last_but_one, bound_share, last.most_from_rest());
     for k in (1..count - 2).rev() {
-        sets[k] = before(&intervals[k], floor, &sets[k + 1]);
+        sets[k] = before(&intervals[k], bound_share, &sets[k + 1]);
         if sets[k].0.is_empty() {
             return None;
         }
@@ -434,8 +434,8 @@ impl Landing {
         self.w[0] * b + self.w[1] * c
     }
 
-    fn set(&self, interval: &JerkInterval, floor: f64, most: f64) -> Polygon {
-        let mut set = around(interval, floor);
+    fn set(&self, interval: &JerkInterval, bound_share: f64, most: f64) -> Polygon {
+        let mut set = around(interval, bound_share);
         for [x, y, z, room] in interval.conditions() {
             set.clip(x + z * self.w[0], y + z * self.w[1], room);
         }
@@ -450,7 +450,7 @@ impl Landing {
 /// Under √b the jerk's condition vanishes with b: what it forbids there must be said apart, or speeds would bounce off 0.
 /// With the jerk j a motion that slows down by u needs the speed u² / (2 j) to end that, so `c² <= 8 j √b`: a convex
 /// set. These are corners of the one for twice the jerk, so that the chords between them take nothing away.
-fn around(interval: &JerkInterval, floor: f64) -> Polygon {
+fn around(interval: &JerkInterval, bound_share: f64) -> Polygon {
     let point = &interval.points[0];
     let jerk = 1.0 / point.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
     // And |½ m' c| <= 1 + |m''| b, whatever the jerk.
@@ -465,13 +465,13 @@ fn around(interval: &JerkInterval, floor: f64) -> Polygon {
     corners.extend(levels.iter().map(at).map(|[b, c]| [b, -c]));
     corners.extend(levels.iter().rev().map(at));
     let mut set = Polygon(corners);
-    set.clip(-1.0, 0.0, -floor * interval.floor);
+    set.clip(-1.0, 0.0, -bound_share * interval.lower_bound);
     set
 }
 
 /// The states at a interval's start from which some w leads into `next`.
-fn before(interval: &JerkInterval, floor: f64, next: &Polygon) -> Polygon {
-    let mut set = around(interval, floor);
+fn before(interval: &JerkInterval, bound_share: f64, next: &Polygon) -> Polygon {
+    let mut set = around(interval, bound_share);
     let (mut upper, mut lower) = (Vec::with_capacity(40), Vec::with_capacity(40));
     for [x, y, z, room] in interval.conditions().into_iter().chain(through(interval, next)) {
         if z > 0.0 {
