@@ -388,9 +388,9 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
     }
     let (last, last_but_one) = (&intervals[count - 1], &intervals[count - 2]);
     // Sets at the starts of intervals 1 to count - 2; from that of the last but one the last one's ray is met exactly.
-    let landing = Landing::new(last_but_one, ray(last.length));
+    let terminal = TerminalInterval::new(last_but_one, ray(last.length));
     let mut sets = vec![Polygon::default(); count - 1];
-    sets[count - 2] = landing.set(last_but_one, bound_share, last.most_from_rest());
+    sets[count - 2] = terminal.set(last_but_one, bound_share, last.most_from_rest());
     for k in (1..count - 2).rev() {
         sets[k] = before(&intervals[k], bound_share, &sets[k + 1]);
         if sets[k].0.is_empty() {
@@ -405,7 +405,7 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
     let mut states = vec![[0.0, 0.0], [start, ray(intervals[0].length) * start]];
     for k in 1..count - 1 {
         let from = states[k];
-        let w = if k == count - 2 { landing.w(from) } else { largest_into(&sets[k + 1], &intervals[k], from)? };
+        let w = if k == count - 2 { terminal.w(from) } else { largest_into(&sets[k + 1], &intervals[k], from)? };
         let to = intervals[k].state(from, w, 1.0);
         states.push([to[0].max(0.0), to[1]]);
     }
@@ -414,14 +414,14 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
 }
 
 /// The interval before the last: its w is such that it ends on the ray on which an even jerk leads to rest.
-struct Landing {
+struct TerminalInterval {
     /// w = x b + y c.
     w: [f64; 2],
     /// b at its end, by b and c.
     end: [f64; 2],
 }
 
-impl Landing {
+impl TerminalInterval {
     /// From `c + w h = -g (b + c h + w h²/2)`.
     fn new(interval: &JerkInterval, g: f64) -> Self {
         let h = interval.length;
