@@ -392,7 +392,7 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
     let mut sets = vec![Polygon::default(); count - 1];
     sets[count - 2] = terminal.set(last_but_one, bound_share, last.most_from_rest());
     for k in (1..count - 2).rev() {
-        sets[k] = before(&intervals[k], bound_share, &sets[k + 1]);
+        sets[k] = controllable_set(&intervals[k], bound_share, &sets[k + 1]);
         if sets[k].0.is_empty() {
             return None;
         }
@@ -435,7 +435,7 @@ impl TerminalInterval {
     }
 
     fn set(&self, interval: &JerkInterval, bound_share: f64, most: f64) -> Polygon {
-        let mut set = around(interval, bound_share);
+        let mut set = initial_set(interval, bound_share);
         for [x, y, z, room] in interval.conditions() {
             set.clip(x + z * self.w[0], y + z * self.w[1], room);
         }
@@ -450,7 +450,7 @@ impl TerminalInterval {
 /// Under √b the jerk's condition vanishes with b: what it forbids there must be said apart, or speeds would bounce off 0.
 /// With the jerk j a motion that slows down by u needs the speed u² / (2 j) to end that, so `c² <= 8 j √b`: a convex
 /// set. These are corners of the one for twice the jerk, so that the chords between them take nothing away.
-fn around(interval: &JerkInterval, bound_share: f64) -> Polygon {
+fn initial_set(interval: &JerkInterval, bound_share: f64) -> Polygon {
     let point = &interval.points[0];
     let jerk = 1.0 / point.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
     // And |½ m' c| <= 1 + |m''| b, whatever the jerk.
@@ -470,10 +470,10 @@ fn around(interval: &JerkInterval, bound_share: f64) -> Polygon {
 }
 
 /// The states at a interval's start from which some w leads into `next`.
-fn before(interval: &JerkInterval, bound_share: f64, next: &Polygon) -> Polygon {
-    let mut set = around(interval, bound_share);
+fn controllable_set(interval: &JerkInterval, bound_share: f64, next: &Polygon) -> Polygon {
+    let mut set = initial_set(interval, bound_share);
     let (mut upper, mut lower) = (Vec::with_capacity(40), Vec::with_capacity(40));
-    for [x, y, z, room] in interval.conditions().into_iter().chain(through(interval, next)) {
+    for [x, y, z, room] in interval.conditions().into_iter().chain(propagate(interval, next)) {
         if z > 0.0 {
             upper.push([x / z, y / z, room / z]);
         } else if z < 0.0 {
@@ -495,7 +495,7 @@ fn before(interval: &JerkInterval, bound_share: f64, next: &Polygon) -> Polygon 
 }
 
 /// The conditions on a state at a interval's start and w for getting into a set through the interval.
-fn through(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f64; 4]> {
+fn propagate(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f64; 4]> {
     let h = interval.length;
     // b at the end is b + h c + h²/2 w, c there is c + h w.
     set.edges().map(move |[x, y, room]| [x, x * h + y, 0.5 * x * h * h + y * h, room])
@@ -504,7 +504,7 @@ fn through(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f64;
 /// The largest w by which a interval leads from a state into a set; nothing if there is none at all.
 fn largest_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    for [x, y, z, room] in interval.conditions().into_iter().chain(through(interval, set)) {
+    for [x, y, z, room] in interval.conditions().into_iter().chain(propagate(interval, set)) {
         let left = room - x * b - y * c;
         if z > 0.0 {
             high = high.min(left / z);
