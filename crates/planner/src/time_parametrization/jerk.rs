@@ -55,7 +55,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
             let mut best: Option<Profile> = None;
             for _ in 0..PASSES {
                 let Some(states) = solve(&intervals) else { break };
-                let (found, excess) = emit(machine, section, &intervals, &states);
+                let (found, excess) = build_profile(machine, section, &intervals, &states);
                 if !found.duration.is_finite() {
                     break;
                 }
@@ -113,7 +113,7 @@ impl PointConstraints {
     }
 
     /// Largest shares of the limits on acceleration and jerk.
-    fn shares(&self, state: State, w: f64) -> (f64, f64) {
+    fn utilization(&self, state: State, w: f64) -> (f64, f64) {
         let [b, c] = state;
         let acceleration = |[m1, m2]: [f64; 2]| (0.5 * m1 * c + m2 * b).abs();
         let jerk = |[m1, m2, m3]: [f64; 3]| (0.5 * m1 * w + 1.5 * m2 * c + m3 * b).abs() * b.max(0.0).sqrt();
@@ -144,7 +144,7 @@ struct JerkInterval {
     lower_bound: f64,
 }
 
-const SHARES: [f64; 3] = [0.0, 0.5, 1.0];
+const FRACTIONS: [f64; 3] = [0.0, 0.5, 1.0];
 
 impl JerkInterval {
     /// b and c at a share of it.
@@ -156,7 +156,7 @@ impl JerkInterval {
     /// Puts b* where the speed is now.
     fn linearize_at(&mut self, from: State, to: State) {
         let w = (to[1] - from[1]) / self.length;
-        let speeds = SHARES.map(|share| self.state(from, w, share)[0]);
+        let speeds = FRACTIONS.map(|share| self.state(from, w, share)[0]);
         for (tangent_point, b) in self.tangent_points.iter_mut().zip(speeds) {
             *tangent_point = b.max(1e-3 * *tangent_point);
         }
@@ -172,7 +172,7 @@ impl JerkInterval {
     /// All conditions on (b, c) at its start and w: `x b + y c + z w <= room`.
     fn conditions(&self) -> Vec<[f64; 4]> {
         let mut all = Vec::with_capacity(40);
-        for (j, share) in SHARES.into_iter().enumerate() {
+        for (j, share) in FRACTIONS.into_iter().enumerate() {
             let (point, s) = (&self.points[j], share * self.length);
             // b there is b + s c + s²/2 w, c there is c + s w.
             let mut hold = |of_b: f64, of_c: f64, of_w: f64, room: f64| {
@@ -203,7 +203,7 @@ impl JerkInterval {
 
     /// The largest b that an even jerk in time from rest may lead to at the other end of the interval: all limits grow with
     /// b there, so their worst over the interval is at that end.
-    fn most_from_rest(&self) -> f64 {
+    fn largest_from_rest(&self) -> f64 {
         let h = self.length;
         // With b there: c = 4 b / (3 h), u = c / 2, and the jerk of s is √b³ / (rest of this) by s = j t³/6.
         let jerk = JERK_OF_REST / (h * h);
@@ -229,7 +229,7 @@ impl JerkInterval {
 const JERK_OF_REST: f64 = 2.0 / 9.0;
 
 /// c over b at the end of a interval that begins at rest.
-fn ray(length: f64) -> f64 {
+fn rest_ray_slope(length: f64) -> f64 {
     4.0 / (3.0 * length)
 }
 
@@ -249,7 +249,7 @@ fn intervals(
         .filter_map(|motor| motor.max_jerk_ticks_s3.map(|jerk| motor.max_acceleration_ticks_s2 / jerk));
     let build_up = build_up.fold(0.0, f64::max);
     let total: f64 = path.cells.iter().map(|interval| interval.length).sum();
-    let mut speeds = Speeds { phases: &fastest.phases, at: 0 };
+    let mut speeds = SquaredSpeeds { phases: &fastest.phases, at: 0 };
     let mut intervals = Vec::new();
     let mut done = 0.0;
     for interval in &path.cells {
@@ -262,7 +262,7 @@ fn intervals(
         let ramp = 0.02 * acceleration.fold(f64::INFINITY, f64::min) * build_up * build_up;
         let longest = interval.length / if matches!(piece.curve, Segment::Line(_)) { 1.0 } else { 2.0 };
         let mut at = 0.0;
-        while let Some(left) = left_of(interval.length, at) {
+        while let Some(left) = remaining_length(interval.length, at) {
             let s = done + at;
             let to_rest = s.min(total - s);
             let speed = speeds.square(interval.piece, interval.start + at).sqrt();
@@ -279,7 +279,7 @@ fn intervals(
             let points = [point(0.0)?, point(0.5)?, point(1.0)?];
             let top = points.iter().map(|point| point.cap(cap)).fold(f64::INFINITY, f64::min);
             let row_limit = if interval.near_corner { rows } else { f64::INFINITY };
-            let tangent_points = SHARES.map(|share| {
+            let tangent_points = FRACTIONS.map(|share| {
                 let s = s + share * length;
                 let b = speeds.square(interval.piece, start + share * length).min(top);
                 let rest = s.min(total - s).max(0.1 * length);
@@ -305,7 +305,7 @@ fn intervals(
 }
 
 /// What is left of a length, unless that is but a rounding error: that would be a interval on which no law can be found.
-fn left_of(length: f64, at: f64) -> Option<f64> {
+fn remaining_length(length: f64, at: f64) -> Option<f64> {
     let left = length - at;
     (left > 1e-9 * length).then_some(left)
 }
@@ -314,7 +314,7 @@ fn left_of(length: f64, at: f64) -> Option<f64> {
 /// down need no more acceleration than can be given up again while the speed changes by a half.
 ///
 /// Going as fast as possible from the start would brake for a turn so late that the pen nearly stands when the brake is
-/// released. Speeds below a share of these are therefore not taken.
+/// released. SquaredSpeeds below a share of these are therefore not taken.
 fn set_lower_bounds(intervals: &mut [JerkInterval]) {
     let total: f64 = intervals.iter().map(|interval| interval.length).sum();
     let mut at = 0.0_f64;
@@ -356,12 +356,12 @@ impl PointConstraints {
 }
 
 /// (ds/dt)² along a profile, asked for in order.
-struct Speeds<'a> {
+struct SquaredSpeeds<'a> {
     phases: &'a [Phase],
     at: usize,
 }
 
-impl Speeds<'_> {
+impl SquaredSpeeds<'_> {
     fn square(&mut self, piece: usize, s: f64) -> f64 {
         let before =
             |phase: &Phase| phase.piece < piece || (phase.piece == piece && phase.way(phase.duration) < s);
@@ -388,9 +388,9 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
     }
     let (last, last_but_one) = (&intervals[count - 1], &intervals[count - 2]);
     // Sets at the starts of intervals 1 to count - 2; from that of the last but one the last one's ray is met exactly.
-    let terminal = TerminalInterval::new(last_but_one, ray(last.length));
+    let terminal = TerminalInterval::new(last_but_one, rest_ray_slope(last.length));
     let mut sets = vec![Polygon::default(); count - 1];
-    sets[count - 2] = terminal.set(last_but_one, bound_share, last.most_from_rest());
+    sets[count - 2] = terminal.set(last_but_one, bound_share, last.largest_from_rest());
     for k in (1..count - 2).rev() {
         sets[k] = controllable_set(&intervals[k], bound_share, &sets[k + 1]);
         if sets[k].0.is_empty() {
@@ -398,14 +398,14 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
         }
     }
     // From rest, as far along the ray as the set allows.
-    let start = sets[1].farthest(ray(intervals[0].length))?.min(intervals[0].most_from_rest());
+    let start = sets[1].farthest(rest_ray_slope(intervals[0].length))?.min(intervals[0].largest_from_rest());
     if start <= 0.0 {
         return None;
     }
-    let mut states = vec![[0.0, 0.0], [start, ray(intervals[0].length) * start]];
+    let mut states = vec![[0.0, 0.0], [start, rest_ray_slope(intervals[0].length) * start]];
     for k in 1..count - 1 {
         let from = states[k];
-        let w = if k == count - 2 { terminal.w(from) } else { largest_into(&sets[k + 1], &intervals[k], from)? };
+        let w = if k == count - 2 { terminal.w(from) } else { largest_w_into(&sets[k + 1], &intervals[k], from)? };
         let to = intervals[k].state(from, w, 1.0);
         states.push([to[0].max(0.0), to[1]]);
     }
@@ -502,7 +502,7 @@ fn propagate(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f6
 }
 
 /// The largest w by which a interval leads from a state into a set; nothing if there is none at all.
-fn largest_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option<f64> {
+fn largest_w_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     for [x, y, z, room] in interval.conditions().into_iter().chain(propagate(interval, set)) {
         let left = room - x * b - y * c;
@@ -521,7 +521,7 @@ fn largest_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option
 
 /// The phases through the states, slowed down until the limits hold between the points that were looked at too; and by how
 /// much each interval exceeded its limits on acceleration and jerk.
-fn emit(
+fn build_profile(
     machine: &Machine,
     section: &[Piece],
     intervals: &[JerkInterval],
@@ -562,10 +562,10 @@ fn emit(
                     PointConstraints::at(machine, &section[interval.piece], interval.start + share * h).unwrap_or(interval.points[1])
                 }
             };
-            point.shares(interval.state(from, w, share), w)
+            point.utilization(interval.state(from, w, share), w)
         });
         let excess = (peak(shares.map(|share| share.0)), peak(shares.map(|share| share.1)));
-        limit(interval, from, to, excess, phase.duration, &mut profile);
+        record_active_constraint(interval, from, to, excess, phase.duration, &mut profile);
         slower = slower.max(excess.0.sqrt()).max(libm::cbrt(excess.1)).max(speed.sqrt());
         let beyond = |share: f64| if share > EXCESS { share } else { 1.0 };
         excesses.push((beyond(excess.0), beyond(excess.1)));
@@ -583,7 +583,7 @@ fn peak<const N: usize>(samples: [f64; N]) -> f64 {
 }
 
 /// Books the time of a interval to what is nearest to its limit.
-fn limit(interval: &JerkInterval, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
+fn record_active_constraint(interval: &JerkInterval, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
     let limiting = &mut profile.limiting;
     let point = &interval.points[1];
     let w = (to[1] - from[1]) / interval.length;
@@ -646,15 +646,15 @@ fn slowed_until_smooth(machine: &Machine, profile: Profile, cap: &SpeedCap) -> P
 mod tests {
     use proptest::prelude::*;
 
-    use super::left_of;
+    use super::remaining_length;
 
     proptest! {
         /// A interval of 1e-17 mm once stood at the end of a piece, and the plan of examples/rosette.hpgl took 31 minutes instead of 13.
         #[test]
         fn a_rounding_error_is_no_cell(length in 1e-3..1e3f64, share in 0.0..1.0f64) {
             let at = share * length;
-            if let Some(left) = left_of(length, at) {
-                prop_assert_eq!(left_of(length, at + left), None);
+            if let Some(left) = remaining_length(length, at) {
+                prop_assert_eq!(remaining_length(length, at + left), None);
             }
         }
     }
