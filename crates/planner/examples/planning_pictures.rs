@@ -5,7 +5,7 @@ use std::path::Path;
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::joint_path::{Cell, Course};
+use planner::joint_path::{GridInterval, Course};
 use planner::path::{Budget, Corner, Section, sections};
 use planner::time_parametrization::{SpeedCap, profile};
 use planner::{JointPath, Settings, plan};
@@ -151,12 +151,12 @@ fn speed() -> Result<String, Failure> {
         let path = JointPath::lift(&machine, section, pose, 0.05)?;
         let Course::Drawn(_, section) = &path.course else { return Err("strokes are drawn".into()) };
         let mut at = way;
-        for cell in &path.cells {
+        for interval in &path.intervals {
             for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
-                let pen = pen_speed(section, cell.piece, cell.start + share * cell.length);
-                limit.push((at + share * pen * cell.length, pen * most(&machine, cell, j)));
+                let pen = pen_speed(section, interval.piece, interval.start + share * interval.length);
+                limit.push((at + share * pen * interval.length, pen * most(&machine, interval, j)));
             }
-            at += cell.length * pen_speed(section, cell.piece, cell.start + 0.5 * cell.length);
+            at += interval.length * pen_speed(section, interval.piece, interval.start + 0.5 * interval.length);
         }
         for phase in profile(&machine, &path, &cap).phases {
             let mut from = way;
@@ -191,10 +191,10 @@ fn pen_speed(section: &Section, piece: usize, s: f64) -> f64 {
     piece.rate * piece.curve.derivatives(s * piece.rate).0.hypot()
 }
 
-/// The largest ds/dt at one of a cell's samples: by the motors' speeds, and by what some d²s/dt² allows both.
-fn most(machine: &Machine, cell: &Cell, sample: usize) -> f64 {
+/// The largest ds/dt at one of a interval's samples: by the motors' speeds, and by what some d²s/dt² allows both.
+fn most(machine: &Machine, interval: &GridInterval, sample: usize) -> f64 {
     let [a, b] = machine.motors();
-    let (first, second) = (cell.first[sample], cell.second[sample]);
+    let (first, second) = (interval.first[sample], interval.second[sample]);
     let speed = (a.max_speed_ticks_s / first[0].abs()).min(b.max_speed_ticks_s / first[1].abs());
     let room = a.max_acceleration_ticks_s2 * first[1].abs() + b.max_acceleration_ticks_s2 * first[0].abs();
     speed.min((room / (first[0] * second[1] - first[1] * second[0]).abs()).sqrt())

@@ -13,8 +13,8 @@ use crate::path::{Piece, Section};
 pub struct JointPath {
     /// Where the path goes.
     pub course: Course,
-    /// The cells, in order, without gaps; at least one.
-    pub cells: Vec<Cell>,
+    /// The intervals, in order, without gaps; at least one.
+    pub intervals: Vec<GridInterval>,
 }
 
 /// Where a joint path goes.
@@ -28,15 +28,15 @@ pub enum Course {
 
 /// A stretch of a joint path between two nodes.
 #[derive(Clone, Copy, Debug)]
-pub struct Cell {
+pub struct GridInterval {
     /// Its length in the parameter `s`.
     pub length: f64,
-    /// Index of the piece it lies on, and where on it the cell begins, in `s`.
+    /// Index of the piece it lies on, and where on it the interval begins, in `s`.
     pub piece: usize,
     /// See `piece`.
     pub start: f64,
     /// The motors' derivatives by `s` at its start, middle and end, ticks per unit. The two sides of a node differ where
-    /// pieces meet, so each cell has its own.
+    /// pieces meet, so each interval has its own.
     pub first: [MotorPos; 3],
     /// Second derivatives, likewise.
     pub second: [MotorPos; 3],
@@ -52,10 +52,10 @@ pub struct Cell {
     pub slack: f64,
 }
 
-/// No joint turns by more over a cell, rad: no peak of a derivative can hide between its samples.
+/// No joint turns by more over a interval, rad: no peak of a derivative can hide between its samples.
 const LARGEST_TURN: f64 = 0.15;
 
-/// How far the derivatives in the middle of a cell may be from the mean of its ends, as a share of what limits speed.
+/// How far the derivatives in the middle of a interval may be from the mean of its ends, as a share of what limits speed.
 const LARGEST_BULGE: f64 = 0.02;
 
 /// Cells are not cut shorter than this, mm.
@@ -68,11 +68,11 @@ pub(crate) struct Rates {
     pub(crate) first: MotorPos,
     /// Likewise.
     pub(crate) second: MotorPos,
-    /// See [`Cell::pen_speed`].
+    /// See [`GridInterval::pen_speed`].
     pub(crate) pen_speed: f64,
     /// Curvature times speed², 1/mm.
     turning: f64,
-    /// See [`Cell::bend`].
+    /// See [`GridInterval::bend`].
     pub(crate) bend: f64,
 }
 
@@ -93,7 +93,7 @@ impl JointPath {
         let pen_speed = travel_speed(machine, from, to);
         (change.max_abs() > 0.0).then(|| Self {
             course: Course::Travel(from, to),
-            cells: vec![Cell {
+            intervals: vec![GridInterval {
                 length: 1.0,
                 piece: 0,
                 start: 0.0,
@@ -109,7 +109,7 @@ impl JointPath {
 
     /// Lifts a smooth section of the drawing, beginning at `pose`, which must hold the pen at its first point.
     ///
-    /// Cells are bisected until (1) linear joint motion over a cell would stay within `tolerance` mm of the curve, by
+    /// Cells are bisected until (1) linear joint motion over a interval would stay within `tolerance` mm of the curve, by
     /// the proved bound of [`kinematics::Geometry::bend`] plus the curve's own chord error; (2) no joint turns by more
     /// than 0.15 rad over it; (3) the motors' derivatives in its middle are within a fiftieth of the mean of its ends,
     /// as a share of what limits the pen.
@@ -122,18 +122,18 @@ impl JointPath {
         pose: JointPos,
         tolerance: f64,
     ) -> Result<Self, OutOfReach> {
-        let mut lifter = Lifter { machine, tolerance, cells: Vec::with_capacity(section.len()) };
+        let mut lifter = Lifter { machine, tolerance, intervals: Vec::with_capacity(section.len()) };
         let mut near = pose;
         for (index, piece) in section.iter().enumerate() {
             machine.check_segment(&piece.curve)?;
             near = lifter.piece(index, piece, near)?;
         }
-        Ok(Self { course: Course::Drawn(pose, section), cells: lifter.cells })
+        Ok(Self { course: Course::Drawn(pose, section), intervals: lifter.intervals })
     }
 }
 
-impl Cell {
-    /// The cell, cut in two so many times over.
+impl GridInterval {
+    /// The interval, cut in two so many times over.
     pub(crate) fn cut(&self, machine: &Machine, course: &Course, times: u32, to: &mut Vec<Self>) {
         match if times > 0 { self.halves(machine, course) } else { None } {
             Some(halves) => halves.iter().for_each(|half| half.cut(machine, course, times - 1, to)),
@@ -141,8 +141,8 @@ impl Cell {
         }
     }
 
-    /// Two cells in place of this one, with derivatives taken anew; nothing for travel, where there is nothing to gain,
-    /// and for cells too short to be cut.
+    /// Two intervals in place of this one, with derivatives taken anew; nothing for travel, where there is nothing to gain,
+    /// and for intervals too short to be cut.
     fn halves(&self, machine: &Machine, course: &Course) -> Option<[Self; 2]> {
         let Course::Drawn(_, section) = course else { return None };
         if self.length <= 2.0 * SHORTEST {
@@ -173,7 +173,7 @@ impl Cell {
                 slack,
                 first,
                 second,
-                // What holds for all of the cell holds for its halves.
+                // What holds for all of the interval holds for its halves.
                 ..*self
             }
         };
@@ -218,11 +218,11 @@ impl Course {
 struct Lifter<'a> {
     machine: &'a Machine,
     tolerance: f64,
-    cells: Vec<Cell>,
+    intervals: Vec<GridInterval>,
 }
 
-/// How many cells a curve begins with: enough that the three samples of a cell cannot miss a wave, and that a time law
-/// with one acceleration a cell comes near to the best.
+/// How many intervals a curve begins with: enough that the three samples of a interval cannot miss a wave, and that a time law
+/// with one acceleration a interval comes near to the best.
 fn first_cells(piece: &Piece) -> usize {
     match &piece.curve {
         Segment::Line(_) => 1,
@@ -244,14 +244,14 @@ impl Lifter<'_> {
         let mut from = self.sample(piece, 0.0, near)?;
         for part in 1..=parts {
             let to = self.sample(piece, length * (part as f64 / parts as f64), from.pose)?;
-            self.cell(index, piece, from, to)?;
+            self.interval(index, piece, from, to)?;
             from = to;
         }
         Ok(from.pose)
     }
 
-    /// Adds the cells between two samples, bisecting as long as one cell would not do.
-    fn cell(&mut self, index: usize, piece: &Piece, from: Sample, to: Sample) -> Result<(), OutOfReach> {
+    /// Adds the intervals between two samples, bisecting as long as one interval would not do.
+    fn interval(&mut self, index: usize, piece: &Piece, from: Sample, to: Sample) -> Result<(), OutOfReach> {
         // An explicit stack keeps the order and bounds the memory.
         let mut pending = vec![(from, to)];
         while let Some((a, b)) = pending.pop() {
@@ -275,7 +275,7 @@ impl Lifter<'_> {
             }
             let samples = [&a.rates, &middle.rates, &b.rates];
             let most = |of: fn(&Rates) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
-            self.cells.push(Cell {
+            self.intervals.push(GridInterval {
                 length,
                 piece: index,
                 start: a.s,
@@ -314,7 +314,7 @@ impl Lifter<'_> {
         of(0).max(of(1))
     }
 
-    /// Whether the cell is short enough for linear joint motion.
+    /// Whether the interval is short enough for linear joint motion.
     fn is_near(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
         let turning = a.rates.turning.max(middle.rates.turning).max(b.rates.turning);
         let deviation = (self.machine.geometry().second_derivative_bound(&a.pose, &b.pose)

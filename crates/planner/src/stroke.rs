@@ -111,10 +111,10 @@ impl StrokePlanner<'_> {
         Ok(drawn)
     }
 
-    /// The pose at the end of a drawn path, unwrapped along its cells.
+    /// The pose at the end of a drawn path, unwrapped along its intervals.
     fn end_pose(&self, path: &JointPath, end: Point) -> Result<JointPos, OutOfReach> {
-        let along = path.cells.iter().fold(path.course.start(), |near, cell| {
-            path.course.pose(self.machine, cell.piece, cell.start, &near)
+        let along = path.intervals.iter().fold(path.course.start(), |near, interval| {
+            path.course.pose(self.machine, interval.piece, interval.start, &near)
         });
         let fault = |unreachable: Unreachable| OutOfReach { point: end, fault: unreachable.into() };
         self.machine.pose_near(end, &along).map_err(fault)

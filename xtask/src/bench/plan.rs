@@ -83,8 +83,8 @@ pub(super) fn run(python: &str) -> Result<bool> {
         println!("{name:<14} {:>10.2} {:>10.2} {:>10.3}", 1e3 * one, 1e3 * ten, (ten / one).log10());
     }
     println!(
-        "cells: {} of {} joint paths; {} phases",
-        stages.cells,
+        "intervals: {} of {} joint paths; {} phases",
+        stages.intervals,
         stages.paths.len(),
         stages.profiles.iter().map(|p| p.phases.len()).sum::<usize>()
     );
@@ -268,10 +268,10 @@ impl Peaks {
 struct Stages {
     path: f64,
     lift: f64,
-    /// On the path's own cells, and refined.
+    /// On the path's own intervals, and refined.
     rough_law: f64,
     time_law: f64,
-    cells: usize,
+    intervals: usize,
     paths: Vec<JointPath>,
     rough: Vec<Profile>,
     profiles: Vec<Profile>,
@@ -310,8 +310,8 @@ impl Stages {
         };
         let (rough, rough_law) = law(rough_profile);
         let (profiles, time_law) = law(profile);
-        let cells = paths.iter().map(|path| path.cells.len()).sum();
-        Ok(Self { path, lift, rough_law, time_law, cells, paths, rough, profiles })
+        let intervals = paths.iter().map(|path| path.intervals.len()).sum();
+        Ok(Self { path, lift, rough_law, time_law, intervals, paths, rough, profiles })
     }
 }
 
@@ -357,7 +357,7 @@ fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) ->
         writeln!(text, "{} {}", point.x + point.y, point.x - point.y)?;
     }
     let belts = file("points.txt", &text)?;
-    let longest = stages.paths.iter().max_by_key(|path| path.cells.len()).context("no joint path")?;
+    let longest = stages.paths.iter().max_by_key(|path| path.intervals.len()).context("no joint path")?;
     let nodes = file("nodes.txt", &nodes(machine, longest))?;
     let Some(said) = run_python(python, &script, &belts, &nodes)? else {
         println!(
@@ -370,7 +370,7 @@ fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) ->
         "", "nodes", "CPU ms", "M nodes/s", "motion s", "worst a", "mm off"
     );
     for (name, profiles, seconds) in [
-        ("plotplan, on the path's own cells", &stages.rough, stages.rough_law),
+        ("plotplan, on the path's own intervals", &stages.rough, stages.rough_law),
         ("plotplan, refined (what plans are)", &stages.profiles, stages.time_law),
     ] {
         let (nodes, time) = nodes_and_time(profiles);
@@ -390,7 +390,7 @@ fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) ->
             continue;
         }
         println!(
-            "{name:<38} {count:>8} {:>9.2} {:>9.4} {motion:>10.3} {worst:>11.3} {off:>8.3}  {:.0} times as long as on the path's own cells, {:.0} as refined",
+            "{name:<38} {count:>8} {:>9.2} {:>9.4} {motion:>10.3} {worst:>11.3} {off:>8.3}  {:.0} times as long as on the path's own intervals, {:.0} as refined",
             1e3 * cpu,
             1e-6 * count / cpu,
             cpu / stages.rough_law,
@@ -430,14 +430,14 @@ fn nodes(machine: &Machine, path: &JointPath) -> String {
         let _ = writeln!(text, "{s} {} {} {} {} {} {}", q[0], q[1], first[0], first[1], second[0], second[1]);
     };
     let mut last = (0, 0.0);
-    for cell in &path.cells {
-        let parts = (cell.length / 0.2).ceil().max(1.0);
+    for interval in &path.intervals {
+        let parts = (interval.length / 0.2).ceil().max(1.0);
         for k in 0..parts as u32 {
-            let from = cell.length * f64::from(k) / parts;
-            node(s + from, cell.piece, cell.start + from);
+            let from = interval.length * f64::from(k) / parts;
+            node(s + from, interval.piece, interval.start + from);
         }
-        s += cell.length;
-        last = (cell.piece, cell.start + cell.length);
+        s += interval.length;
+        last = (interval.piece, interval.start + interval.length);
     }
     node(s, last.0, last.1);
     text

@@ -1,20 +1,20 @@
-//! Speed under motor speeds and accelerations: reachable sets, cells cut finer where that gains time.
+//! Speed under motor speeds and accelerations: reachable sets, intervals cut finer where that gains time.
 //!
 //! Reachable-set method (Pham & Pham 2018, arXiv 1707.07239). Since (0, 0) is allowed everywhere and all conditions are
 //! convex, the set of b from which the end can be reached is an interval [0, top] at every node. Backward sweep: `top`
-//! at a node is the largest b for which some u fulfils the cell's conditions and leads into [0, top of the next node].
-//! Forward sweep: the largest u at each node. Cost linear in the number of cells.
+//! at a node is the largest b for which some u fulfils the interval's conditions and leads into [0, top of the next node].
+//! Forward sweep: the largest u at each node. Cost linear in the number of intervals.
 //!
-//! With one acceleration a cell, no motor stays at its limit throughout a cell on which its derivatives change. Where
-//! motors idle for that reason, cells are cut in two and the law is laid anew, a window of cells at a time, until what
+//! With one acceleration a interval, no motor stays at its limit throughout a interval on which its derivatives change. Where
+//! motors idle for that reason, intervals are cut in two and the law is laid anew, a window of intervals at a time, until what
 //! idling costs is below a share of the time that nobody will see.
 
 use kinematics::Machine;
 
 use super::{Profile, SpeedCap, constraints::IntervalConstraints};
-use crate::joint_path::{Cell, Course, JointPath};
+use crate::joint_path::{GridInterval, Course, JointPath};
 
-/// How many of the path's own cells are refined together: memory and cost follow it, and its ends are held to the
+/// How many of the path's own intervals are refined together: memory and cost follow it, and its ends are held to the
 /// speeds of the coarse law.
 const WINDOW: usize = 256;
 
@@ -24,13 +24,13 @@ const IDLE_COST: f64 = 4e-4;
 /// ... or until cutting them in two brings no more than this share.
 const LEAST_GAIN: f64 = 1e-4;
 
-/// A cell is not cut if its motors idle by less than this share of their limits.
+/// A interval is not cut if its motors idle by less than this share of their limits.
 const IDLE: f64 = 2e-3;
 
 /// Cells that take less than this share of the time between rows are not cut: nobody would see where in it motors idle.
 const SHORTEST: f64 = 1.0 / 16.0;
 
-/// How often cells are cut in two.
+/// How often intervals are cut in two.
 const ROUNDS: usize = 8;
 
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
@@ -38,10 +38,10 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     let mut profile = Profile::new();
     let mut window = Law::default();
     let (mut from, mut speed, mut slower) = (0, 0.0, 1.0_f64);
-    while from < path.cells.len() {
+    while from < path.intervals.len() {
         let to = coarse.window_end(from + WINDOW);
-        window.cells.clear();
-        window.cells.extend_from_slice(&coarse.cells[from..to]);
+        window.intervals.clear();
+        window.intervals.extend_from_slice(&coarse.intervals[from..to]);
         window.sweep(speed, coarse.nodes[to]);
         window.refine(machine, &path.course, cap);
         speed = window.nodes[window.order.len()];
@@ -52,7 +52,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     profile.slowed(slower)
 }
 
-/// With no more cells than the path has, but for such as begin and end at rest.
+/// With no more intervals than the path has, but for such as begin and end at rest.
 pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     let mut profile = Profile::new();
     let law = Law::of(machine, path, cap);
@@ -60,18 +60,18 @@ pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Prof
     profile.slowed(law.excess(machine).sqrt())
 }
 
-/// A cell with its conditions.
+/// A interval with its conditions.
 #[derive(Clone)]
 struct Held {
-    cell: Cell,
+    interval: GridInterval,
     constraints: IntervalConstraints,
 }
 
-/// The fastest way over some cells.
+/// The fastest way over some intervals.
 #[derive(Default)]
 struct Law {
-    cells: Vec<Held>,
-    /// The cells' order along the path, as indices.
+    intervals: Vec<Held>,
+    /// The intervals' order along the path, as indices.
     order: Vec<usize>,
     /// b at every node.
     nodes: Vec<f64>,
@@ -80,24 +80,24 @@ struct Law {
 impl Law {
     /// Over all of a path, from rest to rest.
     fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
-        let hold = |cell: &Cell| Held { constraints: IntervalConstraints::new(machine, cell, cap), cell: *cell };
-        let mut law = Self { cells: path.cells.iter().map(hold).collect(), ..Self::default() };
+        let hold = |interval: &GridInterval| Held { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
+        let mut law = Self { intervals: path.intervals.iter().map(hold).collect(), ..Self::default() };
         law.sweep(0.0, 0.0);
         law
     }
 
-    /// Finds b at every node of all cells in a row: from `start`, or the largest b from which there is a way if that is
+    /// Finds b at every node of all intervals in a row: from `start`, or the largest b from which there is a way if that is
     /// less, to at most `end`.
     fn sweep(&mut self, start: f64, end: f64) {
         self.order.clear();
-        self.order.extend(0..self.cells.len());
-        sweeps(&self.cells, &self.order, start, end, &mut self.nodes);
+        self.order.extend(0..self.intervals.len());
+        sweeps(&self.intervals, &self.order, start, end, &mut self.nodes);
     }
 
-    /// Every cell with b at its start and end.
+    /// Every interval with b at its start and end.
     fn runs(&self) -> impl Iterator<Item = (&Held, f64, f64)> {
-        let cells = self.order.iter().map(|index| &self.cells[*index]);
-        cells.zip(self.nodes.windows(2)).map(|(held, b)| (held, b[0], b[1]))
+        let intervals = self.order.iter().map(|index| &self.intervals[*index]);
+        intervals.zip(self.nodes.windows(2)).map(|(held, b)| (held, b[0], b[1]))
     }
 
     fn time(&self) -> f64 {
@@ -107,12 +107,12 @@ impl Law {
     /// The node at which a window that is to end at `wanted` should: where the law is nearest to the largest speed, or on
     /// a straight way, so that nothing is lost by keeping to the coarse law there.
     fn window_end(&self, wanted: usize) -> usize {
-        if wanted + WINDOW / 4 >= self.cells.len() {
-            return self.cells.len();
+        if wanted + WINDOW / 4 >= self.intervals.len() {
+            return self.intervals.len();
         }
         let room = |k: usize| {
-            let (before, after) = (&self.cells[k - 1], &self.cells[k]);
-            let straight = before.cell.is_straight() && after.cell.is_straight();
+            let (before, after) = (&self.intervals[k - 1], &self.intervals[k]);
+            let straight = before.interval.is_straight() && after.interval.is_straight();
             if straight { 2.0 } else { self.nodes[k] / before.constraints.cap.min(after.constraints.cap) }
         };
         let best = (wanted..wanted + WINDOW / 4).fold((wanted, 0.0), |best, k| {
@@ -122,7 +122,7 @@ impl Law {
         best.0
     }
 
-    /// Cuts the cells as often as it pays.
+    /// Cuts the intervals as often as it pays.
     fn refine(&mut self, machine: &Machine, course: &Course, cap: &SpeedCap) {
         let (start, end) = (self.nodes[0], self.nodes[self.order.len()]);
         let mut time = self.time();
@@ -132,17 +132,17 @@ impl Law {
             order.clear();
             for (index, cuts) in self.order.iter().zip(cuts) {
                 finer.clear();
-                self.cells[*index].cell.cut(machine, course, cuts, &mut finer);
+                self.intervals[*index].interval.cut(machine, course, cuts, &mut finer);
                 if finer.len() > 1 {
-                    order.extend(self.cells.len()..self.cells.len() + finer.len());
-                    let hold = |cell: &Cell| Held { constraints: IntervalConstraints::new(machine, cell, cap), cell: *cell };
-                    self.cells.extend(finer.iter().map(hold));
+                    order.extend(self.intervals.len()..self.intervals.len() + finer.len());
+                    let hold = |interval: &GridInterval| Held { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
+                    self.intervals.extend(finer.iter().map(hold));
                 } else {
                     order.push(*index);
                 }
             }
-            sweeps(&self.cells, &order, start, end, &mut nodes);
-            // The finer cells' conditions are held in more places, so in rare cases the speed given is too high for them.
+            sweeps(&self.intervals, &order, start, end, &mut nodes);
+            // The finer intervals' conditions are held in more places, so in rare cases the speed given is too high for them.
             if order.len() == self.order.len() || nodes[0] < start {
                 break;
             }
@@ -155,19 +155,19 @@ impl Law {
         }
     }
 
-    /// How often each cell that takes longer than `shortest` is to be cut in two because its motors idle; nothing if that
+    /// How often each interval that takes longer than `shortest` is to be cut in two because its motors idle; nothing if that
     /// costs next to no `time`.
     fn cuts(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
         let mut cuts = Vec::with_capacity(self.order.len());
         let (mut cost, mut hanging) = (0.0, false);
-        for (Held { constraints, cell }, from, to) in self.runs() {
+        for (Held { constraints, interval }, from, to) in self.runs() {
             let own_time = constraints.time(from, to);
             if own_time < shortest {
                 cuts.push(0);
                 continue;
             }
             // What the limits were lowered by for want of samples counts as idle too.
-            let idleness = constraints.idleness(from, to) + cell.slack;
+            let idleness = constraints.idleness(from, to) + interval.slack;
             // A motion with limits lower by a share takes longer by half of it.
             cost += 0.5 * idleness * own_time;
             let hangs = constraints.hangs_on_speed(from, to);
@@ -186,15 +186,15 @@ impl Law {
     /// way. That is a few millionths as a rule; the motion is made slower by as much.
     fn excess(&self, machine: &Machine) -> f64 {
         let mut excess = 1.0_f64;
-        for (Held { cell, .. }, from, to) in self.runs() {
-            let u = 0.5 * (to - from) / cell.length;
+        for (Held { interval, .. }, from, to) in self.runs() {
+            let u = 0.5 * (to - from) / interval.length;
             for (half, share) in [0.25, 0.75].into_iter().enumerate() {
                 let b = from + share * (to - from);
-                let first = 0.5 * (cell.first[half] + cell.first[half + 1]);
-                let second = 0.5 * (cell.second[half] + cell.second[half + 1]);
+                let first = 0.5 * (interval.first[half] + interval.first[half + 1]);
+                let second = 0.5 * (interval.second[half] + interval.second[half + 1]);
                 for (k, motor) in machine.motors().iter().enumerate() {
                     let acceleration = (first[k] * u + second[k] * b).abs();
-                    excess = excess.max(acceleration * (1.0 + cell.slack) / motor.max_acceleration_ticks_s2);
+                    excess = excess.max(acceleration * (1.0 + interval.slack) / motor.max_acceleration_ticks_s2);
                 }
             }
         }
@@ -203,21 +203,21 @@ impl Law {
 
     fn emit(&self, profile: &mut Profile) {
         for (held, from, to) in self.runs() {
-            held.constraints.phases(&held.cell, from, to, profile);
+            held.constraints.phases(&held.interval, from, to, profile);
         }
     }
 }
 
 /// b at every node: backward from where the end can still be reached, forward as fast as that allows.
-fn sweeps(cells: &[Held], order: &[usize], start: f64, end: f64, nodes: &mut Vec<f64>) {
+fn sweeps(intervals: &[Held], order: &[usize], start: f64, end: f64, nodes: &mut Vec<f64>) {
     nodes.clear();
     nodes.resize(order.len() + 1, end);
     for (k, index) in order.iter().enumerate().rev() {
-        let constraints = &cells[*index].constraints;
-        let before = if k > 0 { cells[order[k - 1]].constraints.cap } else { start };
+        let constraints = &intervals[*index].constraints;
+        let before = if k > 0 { intervals[order[k - 1]].constraints.cap } else { start };
         nodes[k] = constraints.largest(nodes[k + 1]).min(before);
     }
     for (k, index) in order.iter().enumerate() {
-        nodes[k + 1] = cells[*index].constraints.fastest(nodes[k], nodes[k + 1]);
+        nodes[k + 1] = intervals[*index].constraints.fastest(nodes[k], nodes[k + 1]);
     }
 }

@@ -1,4 +1,4 @@
-//! What a cell allows, and the programs in two variables that the sweeps solve on it.
+//! What a interval allows, and the programs in two variables that the sweeps solve on it.
 //!
 //! With `b = (ds/dt)²` and `u = d²s/dt²`, so `db/ds = 2 u`, a motor with position m(s) has
 //!
@@ -6,8 +6,8 @@
 //! speed         |m'| sqrt(b)     <= v      so  b <= (v / |m'|)²
 //! acceleration  |m' u + m'' b|   <= a      linear in (u, b)
 //! ```
-//! On a cell `u` is constant, so b is linear in s. The conditions are held at the cell's start, middle and end; by what m' and
-//! m'' may leave straight lines between those (the cell's [`Cell::slack`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the cell that is
+//! On a interval `u` is constant, so b is linear in s. The conditions are held at the interval's start, middle and end; by what m' and
+//! m'' may leave straight lines between those (the interval's [`GridInterval::slack`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the interval that is
 //! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
 //! two more near turns, where rows would cut them (see `path::slow_zones`).
 //!
@@ -16,21 +16,21 @@
 use kinematics::Machine;
 
 use super::{Limiting, Phase, Profile, SpeedCap};
-use crate::joint_path::Cell;
+use crate::joint_path::GridInterval;
 
-/// The condition `|p u + r b| <= 1`, p >= 0, with b at the cell's start.
+/// The condition `|p u + r b| <= 1`, p >= 0, with b at the interval's start.
 #[derive(Clone, Copy, Debug, Default)]
 struct Strip {
     p: f64,
     r: f64,
 }
 
-/// A cell's conditions.
+/// A interval's conditions.
 #[derive(Clone, Debug)]
 pub(super) struct IntervalConstraints {
-    /// Three of each motor, at the cell's start, middle and end, and two near turns.
+    /// Three of each motor, at the interval's start, middle and end, and two near turns.
     strips: [Strip; 8],
-    /// Twice the cell's length: b at its end is `b + twice * u`.
+    /// Twice the interval's length: b at its end is `b + twice * u`.
     twice: f64,
     /// The largest b anywhere on it by speed.
     pub(super) cap: f64,
@@ -48,7 +48,7 @@ enum Cap {
     Motor(usize),
 }
 
-/// How a cell is run through.
+/// How a interval is run through.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Run {
     /// With one acceleration.
@@ -58,9 +58,9 @@ enum Run {
 }
 
 impl IntervalConstraints {
-    pub(super) fn new(machine: &Machine, cell: &Cell, cap: &SpeedCap) -> Self {
+    pub(super) fn new(machine: &Machine, interval: &GridInterval, cap: &SpeedCap) -> Self {
         let mut strips = [Strip::default(); 8];
-        let pen = cap.pen / cell.pen_speed;
+        let pen = cap.pen / interval.pen_speed;
         let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
         let (mut largest, mut capped_by) = (pen * pen, Cap::Pen);
         let mut lower = |b: f64, by: Cap| {
@@ -68,27 +68,27 @@ impl IntervalConstraints {
                 (largest, capped_by) = (b, by);
             }
         };
-        lower(rows / cell.bend, Cap::Rows);
+        lower(rows / interval.bend, Cap::Rows);
         for (k, motor) in machine.motors().iter().enumerate() {
-            let limit = motor.max_acceleration_ticks_s2 / (1.0 + cell.slack);
+            let limit = motor.max_acceleration_ticks_s2 / (1.0 + interval.slack);
             let mut fastest = 0.0_f64;
             for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
-                let (m1, m2) = (cell.first[j][k] / limit, cell.second[j][k] / limit);
-                let p = m1 + 2.0 * share * cell.length * m2;
+                let (m1, m2) = (interval.first[j][k] / limit, interval.second[j][k] / limit);
+                let p = m1 + 2.0 * share * interval.length * m2;
                 strips[3 * k + j] = if p < 0.0 { Strip { p: -p, r: -m2 } } else { Strip { p, r: m2 } };
-                fastest = fastest.max(cell.first[j][k].abs());
+                fastest = fastest.max(interval.first[j][k].abs());
             }
-            let speed = motor.max_speed_ticks_s / (fastest * (1.0 + cell.slack));
+            let speed = motor.max_speed_ticks_s / (fastest * (1.0 + interval.slack));
             lower(speed * speed, Cap::Motor(k));
         }
-        if cell.near_corner {
+        if interval.near_corner {
             // |p'| |u| + bend b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
-            let (p, r) = (cell.pen_speed / rows, cell.bend / rows);
+            let (p, r) = (interval.pen_speed / rows, interval.bend / rows);
             strips[6] = Strip { p, r };
             strips[7] = Strip { p, r: -r };
         }
-        let twice = 2.0 * cell.length;
-        let top = highest(if cell.near_corner { &strips } else { &strips[..6] }, twice).min(largest);
+        let twice = 2.0 * interval.length;
+        let top = highest(if interval.near_corner { &strips } else { &strips[..6] }, twice).min(largest);
         Self { strips, twice, cap: largest, top, capped_by }
     }
 
@@ -110,7 +110,7 @@ impl IntervalConstraints {
         (b + self.twice * u).clamp(0.0, top)
     }
 
-    /// By how much the motors stay below their limits over the cell with an even acceleration, as a share of them; 0 if
+    /// By how much the motors stay below their limits over the interval with an even acceleration, as a share of them; 0 if
     /// nothing could be gained by cutting it.
     pub(super) fn idleness(&self, b0: f64, b1: f64) -> f64 {
         if self.is_straight() {
@@ -124,9 +124,9 @@ impl IntervalConstraints {
     }
 
     /// Whether a motor that is used hangs on the speed rather than on the acceleration: near a place where its m' vanishes
-    /// (a zero-inertia point) a larger b at the start of a cell allows only a smaller one at its end, so going as fast
+    /// (a zero-inertia point) a larger b at the start of a interval allows only a smaller one at its end, so going as fast
     /// as possible up to there is not the fastest way. With `b1 = b + twice (1 - r b) / p` that begins at `twice r = p`;
-    /// the shorter the cells, the narrower that region.
+    /// the shorter the intervals, the narrower that region.
     pub(super) fn hangs_on_speed(&self, b0: f64, b1: f64) -> bool {
         let u = (b1 - b0) / self.twice;
         self.strips[..6].iter().any(|strip| {
@@ -148,7 +148,7 @@ impl IntervalConstraints {
         self.strips.iter().all(|strip| strip.r == 0.0)
     }
 
-    /// The time over the cell from b0 to b1, s; infinite from rest to rest where it cannot have a peak.
+    /// The time over the interval from b0 to b1, s; infinite from rest to rest where it cannot have a peak.
     pub(super) fn time(&self, b0: f64, b1: f64) -> f64 {
         let length = 0.5 * self.twice;
         let over = |length: f64, a: f64, b: f64| 2.0 * length / (a.sqrt() + b.sqrt());
@@ -160,31 +160,31 @@ impl IntervalConstraints {
         }
     }
 
-    /// Adds the phases over the cell from b0 to b1, and what limits them.
-    pub(super) fn phases(&self, cell: &Cell, b0: f64, b1: f64, profile: &mut Profile) {
-        let mut start = cell.start;
+    /// Adds the phases over the interval from b0 to b1, and what limits them.
+    pub(super) fn phases(&self, interval: &GridInterval, b0: f64, b1: f64, profile: &mut Profile) {
+        let mut start = interval.start;
         let mut push = |length: f64, from: f64, to: f64| {
             if length > 0.0 && from + to > 0.0 {
                 let (slow, fast) = (from.sqrt(), to.sqrt());
                 let duration = 2.0 * length / (slow + fast);
                 let acceleration = (fast - slow) / duration;
-                profile.push(Phase::even(cell.piece, start, slow, acceleration, duration));
+                profile.push(Phase::even(interval.piece, start, slow, acceleration, duration));
                 self.limit(from, to, duration, &mut profile.limiting);
             }
             start += length;
         };
         match self.run(b0, b1) {
-            Run::Even => push(cell.length, b0, b1),
+            Run::Even => push(interval.length, b0, b1),
             Run::Peak { b, up, down } => {
                 push(up, b0, b);
-                push(cell.length - up - down, b, b);
+                push(interval.length - up - down, b, b);
                 push(down, b, b1);
             }
         }
     }
 
     /// An even ramp; or up to a peak and down again where the motors move in proportion to the parameter, so that one
-    /// acceleration holds over all of the cell, and where it begins and ends at rest.
+    /// acceleration holds over all of the interval, and where it begins and ends at rest.
     fn run(&self, b0: f64, b1: f64) -> Run {
         if !self.is_straight() && b0 + b1 > 0.0 {
             return Run::Even;

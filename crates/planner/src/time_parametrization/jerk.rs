@@ -47,7 +47,7 @@ pub(super) fn applies(machine: &Machine) -> bool {
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     match &path.course {
         Course::Travel(..) => {
-            straight::profile(machine, path.cells[0].first[0], cap.pen / path.cells[0].pen_speed)
+            straight::profile(machine, path.intervals[0].first[0], cap.pen / path.intervals[0].pen_speed)
         }
         Course::Drawn(_, section) => {
             let fastest = acceleration::profile(machine, path, cap);
@@ -248,11 +248,11 @@ fn intervals(
         .iter()
         .filter_map(|motor| motor.max_jerk_ticks_s3.map(|jerk| motor.max_acceleration_ticks_s2 / jerk));
     let build_up = build_up.fold(0.0, f64::max);
-    let total: f64 = path.cells.iter().map(|interval| interval.length).sum();
+    let total: f64 = path.intervals.iter().map(|interval| interval.length).sum();
     let mut speeds = SquaredSpeeds { phases: &fastest.phases, at: 0 };
     let mut intervals = Vec::new();
     let mut done = 0.0;
-    for interval in &path.cells {
+    for interval in &path.intervals {
         let piece = &section[interval.piece];
         let acceleration = machine
             .motors()

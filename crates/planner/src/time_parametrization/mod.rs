@@ -161,7 +161,7 @@ pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     }
 }
 
-/// The same with no more cells than the path has: ten times as fast to find, and within a few per cent of the best.
+/// The same with no more intervals than the path has: ten times as fast to find, and within a few per cent of the best.
 pub fn rough_profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     acceleration::rough(machine, path, cap)
 }
