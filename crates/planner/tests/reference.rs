@@ -65,10 +65,10 @@ fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut JointPos) -> Place
 /// Every cell of the path in `parts` parts, and none longer than the whole path's length by `50 parts`.
 fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
     let Course::Drawn(start, section) = &path.course else { unreachable!("strokes are drawn") };
-    let longest = path.cells.iter().map(|cell| cell.length).sum::<f64>() / (50 * parts) as f64;
+    let longest = path.intervals.iter().map(|cell| cell.length).sum::<f64>() / (50 * parts) as f64;
     let mut near = *start;
     let mut grid = Vec::new();
-    for cell in &path.cells {
+    for cell in &path.intervals {
         let piece = &section[cell.piece];
         let count = parts.max((cell.length / longest).ceil() as usize);
         let length = cell.length / count as f64;
