@@ -5,7 +5,7 @@ use std::path::Path;
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::joint_path::{GridInterval, Course};
+use planner::joint_path::{GridInterval, PathGeometry};
 use planner::path::{Budget, Corner, Section, sections};
 use planner::time_parametrization::{SpeedCap, profile};
 use planner::{JointPath, Settings, plan};
@@ -149,7 +149,7 @@ fn speed() -> Result<String, Failure> {
         let pose =
             machine.pose_near(section[0].curve.start(), &machine.start()).map_err(|_| "out of reach")?;
         let path = JointPath::lift(&machine, section, pose, 0.05)?;
-        let Course::Drawn(_, section) = &path.course else { return Err("strokes are drawn".into()) };
+        let PathGeometry::Drawn(_, section) = &path.geometry else { return Err("strokes are drawn".into()) };
         let mut at = way;
         for interval in &path.intervals {
             for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {

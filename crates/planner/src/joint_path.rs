@@ -12,14 +12,14 @@ use crate::path::{Piece, Section};
 #[derive(Clone, Debug)]
 pub struct JointPath {
     /// Where the path goes.
-    pub course: Course,
+    pub geometry: PathGeometry,
     /// The intervals, in order, without gaps; at least one.
     pub intervals: Vec<GridInterval>,
 }
 
 /// Where a joint path goes.
 #[derive(Clone, Debug)]
-pub enum Course {
+pub enum PathGeometry {
     /// The pen follows these pieces, beginning in this pose.
     Drawn(JointPos, Section),
     /// The joints go straight from one pose to the other; the pen is up.
@@ -92,7 +92,7 @@ impl JointPath {
         let change = machine.motor_rates(&(to - from));
         let pen_speed = travel_speed(machine, from, to);
         (change.max_abs() > 0.0).then(|| Self {
-            course: Course::Travel(from, to),
+            geometry: PathGeometry::Travel(from, to),
             intervals: vec![GridInterval {
                 length: 1.0,
                 piece: 0,
@@ -128,23 +128,23 @@ impl JointPath {
             machine.check_segment(&piece.curve)?;
             near = lifter.piece(index, piece, near)?;
         }
-        Ok(Self { course: Course::Drawn(pose, section), intervals: lifter.intervals })
+        Ok(Self { geometry: PathGeometry::Drawn(pose, section), intervals: lifter.intervals })
     }
 }
 
 impl GridInterval {
     /// The interval, cut in two so many times over.
-    pub(crate) fn cut(&self, machine: &Machine, course: &Course, times: u32, to: &mut Vec<Self>) {
-        match if times > 0 { self.halves(machine, course) } else { None } {
-            Some(halves) => halves.iter().for_each(|half| half.cut(machine, course, times - 1, to)),
+    pub(crate) fn cut(&self, machine: &Machine, geometry: &PathGeometry, times: u32, to: &mut Vec<Self>) {
+        match if times > 0 { self.halves(machine, geometry) } else { None } {
+            Some(halves) => halves.iter().for_each(|half| half.cut(machine, geometry, times - 1, to)),
             None => to.push(*self),
         }
     }
 
     /// Two intervals in place of this one, with derivatives taken anew; nothing for travel, where there is nothing to gain,
     /// and for intervals too short to be cut.
-    fn halves(&self, machine: &Machine, course: &Course) -> Option<[Self; 2]> {
-        let Course::Drawn(_, section) = course else { return None };
+    fn halves(&self, machine: &Machine, geometry: &PathGeometry) -> Option<[Self; 2]> {
+        let PathGeometry::Drawn(_, section) = geometry else { return None };
         if self.length <= 2.0 * SHORTEST {
             return None;
         }
@@ -186,7 +186,7 @@ impl GridInterval {
     }
 }
 
-impl Course {
+impl PathGeometry {
     /// The joints at `s` on a piece, exactly on the path; angles are unwrapped to the turn nearest to `near`.
     pub fn pose(&self, machine: &Machine, piece: usize, s: f64, near: &JointPos) -> JointPos {
         match self {

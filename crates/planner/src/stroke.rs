@@ -5,7 +5,7 @@ use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
     Settings,
-    joint_path::{Course, JointPath},
+    joint_path::{PathGeometry, JointPath},
     path::{Budget, Section, sections, vertex_to_vertex},
     settings::{Law, Shares},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile},
@@ -15,7 +15,7 @@ use crate::{
 /// rows: between rows motors move linearly, and a stop between two rows would be cut.
 #[derive(Clone, Debug)]
 pub(crate) struct Move {
-    pub(crate) course: Course,
+    pub(crate) geometry: PathGeometry,
     pub(crate) profile: Profile,
     /// The pose at its end.
     pub(crate) end: JointPos,
@@ -113,8 +113,8 @@ impl StrokePlanner<'_> {
 
     /// The pose at the end of a drawn path, unwrapped along its intervals.
     fn end_pose(&self, path: &JointPath, end: Point) -> Result<JointPos, OutOfReach> {
-        let along = path.intervals.iter().fold(path.course.start(), |near, interval| {
-            path.course.pose(self.machine, interval.piece, interval.start, &near)
+        let along = path.intervals.iter().fold(path.geometry.start(), |near, interval| {
+            path.geometry.pose(self.machine, interval.piece, interval.start, &near)
         });
         let fault = |unreachable: Unreachable| OutOfReach { point: end, fault: unreachable.into() };
         self.machine.pose_near(end, &along).map_err(fault)
@@ -123,18 +123,18 @@ impl StrokePlanner<'_> {
     /// Lays the time law upon a path.
     fn movement(&self, path: JointPath, end: JointPos, pen: f64) -> Move {
         let period = self.period();
-        if let (Law::FixedDuration { easing, segment_time_s }, Course::Drawn(_, section)) =
-            (self.settings.law, &path.course)
+        if let (Law::FixedDuration { easing, segment_time_s }, PathGeometry::Drawn(_, section)) =
+            (self.settings.law, &path.geometry)
         {
             let periods = (segment_time_s / period).round().max(1.0) as u64;
             let length = section.iter().map(crate::path::Piece::length).sum();
             let profile = fixed_duration(easing, length, periods as f64 * period);
-            return Move { course: path.course, profile, end, periods };
+            return Move { geometry: path.geometry, profile, end, periods };
         }
         let cap = SpeedCap { pen, row_deviation: self.shares.row, period };
         let profile = profile(self.machine, &path, &cap);
         let periods = whole_periods(profile.duration, period).max(1);
-        Move { course: path.course, profile, end, periods }
+        Move { geometry: path.geometry, profile, end, periods }
     }
 
     /// The way with the pen up from pose to pose; nothing where there is none.

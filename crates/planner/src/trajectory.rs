@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::{
     PlanError, Settings,
-    joint_path::Course,
+    joint_path::PathGeometry,
     settings::{self, Shares},
     stroke::{Drawn, Move, StrokePlanner, whole_periods},
     time_parametrization::Limiting,
@@ -118,7 +118,7 @@ pub fn plan<'a>(
         let time = leg.periods() as f64 * period;
         match &leg {
             Leg::Pen { .. } => times.lifting += time,
-            Leg::Move(Move { course: Course::Travel(..), .. }) => times.travel += time,
+            Leg::Move(Move { geometry: PathGeometry::Travel(..), .. }) => times.travel += time,
             Leg::Move(Move { profile, .. }) => {
                 times.drawing += time;
                 limiting.add(&profile.limiting, time / profile.duration);
@@ -406,7 +406,7 @@ struct Cursor {
 impl Cursor {
     /// The pose now; `near` is the one before.
     fn pose(&mut self, machine: &Machine, movement: &Move, near: &JointPos) -> JointPos {
-        let Move { course, profile, periods, .. } = movement;
+        let Move { geometry, profile, periods, .. } = movement;
         // The profile is stretched to a whole number of periods, which only slows it down.
         let time = profile.duration * (self.period as f64 / *periods as f64);
         while self.phase + 1 < profile.phases.len()
@@ -418,7 +418,7 @@ impl Cursor {
         let phase = &profile.phases[self.phase];
         let s = phase.way((time - self.phase_start).max(0.0));
         // Between rows no joint turns by half a turn, so the last row's pose says which turn this one is in.
-        course.pose(machine, phase.piece, s, near)
+        geometry.pose(machine, phase.piece, s, near)
     }
 }
 

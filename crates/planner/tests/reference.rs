@@ -18,7 +18,7 @@ use clarabel::solver::{
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
 use planner::JointPath;
-use planner::joint_path::Course;
+use planner::joint_path::PathGeometry;
 use planner::path::{Budget, Corner, Piece, sections};
 use planner::time_parametrization::{SpeedCap, profile};
 use proptest::prelude::*;
@@ -64,7 +64,7 @@ fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut JointPos) -> Place
 
 /// Every cell of the path in `parts` parts, and none longer than the whole path's length by `50 parts`.
 fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
-    let Course::Drawn(start, section) = &path.course else { unreachable!("strokes are drawn") };
+    let PathGeometry::Drawn(start, section) = &path.geometry else { unreachable!("strokes are drawn") };
     let longest = path.intervals.iter().map(|cell| cell.length).sum::<f64>() / (50 * parts) as f64;
     let mut near = *start;
     let mut grid = Vec::new();

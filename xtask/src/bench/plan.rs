@@ -8,7 +8,7 @@ use std::process::Command;
 use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::joint_path::Course;
+use planner::joint_path::PathGeometry;
 use planner::path::{Budget, Corner, sections};
 use planner::placement::{Size, Wish, place};
 use planner::time_parametrization::{Profile, SpeedCap, profile, rough_profile};
@@ -414,7 +414,7 @@ fn run_python(python: &str, script: &Path, points: &Path, nodes: &Path) -> Resul
 
 /// `s q q' q''` in mm of belt at the start of every stretch of a path, none longer than 0.2 mm, and at its end.
 fn nodes(machine: &Machine, path: &JointPath) -> String {
-    let Course::Drawn(start, section) = &path.course else { return String::new() };
+    let PathGeometry::Drawn(start, section) = &path.geometry else { return String::new() };
     let (mut text, mut s, mut near) = (String::new(), 0.0, *start);
     let mut node = |s: f64, piece: usize, at: f64| {
         let piece = &section[piece];

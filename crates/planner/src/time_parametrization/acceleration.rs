@@ -12,7 +12,7 @@
 use kinematics::Machine;
 
 use super::{Profile, SpeedCap, constraints::IntervalConstraints};
-use crate::joint_path::{GridInterval, Course, JointPath};
+use crate::joint_path::{GridInterval, PathGeometry, JointPath};
 
 /// How many of the path's own intervals are refined together: memory and cost follow it, and its ends are held to the
 /// speeds of the coarse law.
@@ -43,7 +43,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
         window.intervals.clear();
         window.intervals.extend_from_slice(&coarse.intervals[from..to]);
         window.sweep(speed, coarse.nodes[to]);
-        window.refine(machine, &path.course, cap);
+        window.refine(machine, &path.geometry, cap);
         speed = window.nodes[window.order.len()];
         slower = slower.max(window.excess(machine).sqrt());
         window.emit(&mut profile);
@@ -123,7 +123,7 @@ impl Law {
     }
 
     /// Cuts the intervals as often as it pays.
-    fn refine(&mut self, machine: &Machine, course: &Course, cap: &SpeedCap) {
+    fn refine(&mut self, machine: &Machine, geometry: &PathGeometry, cap: &SpeedCap) {
         let (start, end) = (self.nodes[0], self.nodes[self.order.len()]);
         let mut time = self.time();
         let (mut order, mut nodes, mut finer) = (Vec::new(), Vec::new(), Vec::new());
@@ -132,7 +132,7 @@ impl Law {
             order.clear();
             for (index, cuts) in self.order.iter().zip(cuts) {
                 finer.clear();
-                self.intervals[*index].interval.cut(machine, course, cuts, &mut finer);
+                self.intervals[*index].interval.cut(machine, geometry, cuts, &mut finer);
                 if finer.len() > 1 {
                     order.extend(self.intervals.len()..self.intervals.len() + finer.len());
                     let hold = |interval: &GridInterval| Held { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };

@@ -25,7 +25,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use super::polygon::Polygon;
 use super::{Phase, Profile, SpeedCap, acceleration, straight};
-use crate::joint_path::{Course, JointPath, Rates, third_derivative};
+use crate::joint_path::{PathGeometry, JointPath, Rates, third_derivative};
 use crate::path::Piece;
 
 /// How often b* is put where the speeds are.
@@ -45,11 +45,11 @@ pub(super) fn applies(machine: &Machine) -> bool {
 
 /// The law on a path.
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    match &path.course {
-        Course::Travel(..) => {
+    match &path.geometry {
+        PathGeometry::Travel(..) => {
             straight::profile(machine, path.intervals[0].first[0], cap.pen / path.intervals[0].pen_speed)
         }
-        Course::Drawn(_, section) => {
+        PathGeometry::Drawn(_, section) => {
             let fastest = acceleration::profile(machine, path, cap);
             let mut intervals = intervals(machine, path, section, cap, &fastest).unwrap_or_default();
             let mut best: Option<Profile> = None;
