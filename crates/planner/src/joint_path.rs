@@ -49,14 +49,14 @@ pub struct GridInterval {
     pub near_corner: bool,
     /// By how much the derivatives may exceed a straight line between the three samples, as a share of the limits: 0
     /// where they are linear in `s` (lines and parabolas on machines whose kinematics are linear).
-    pub slack: f64,
+    pub interpolation_error: f64,
 }
 
 /// No joint turns by more over a interval, rad: no peak of a derivative can hide between its samples.
 const LARGEST_TURN: f64 = 0.15;
 
 /// How far the derivatives in the middle of a interval may be from the mean of its ends, as a share of what limits speed.
-const LARGEST_BULGE: f64 = 0.02;
+const LARGEST_MIDPOINT_ERROR: f64 = 0.02;
 
 /// Cells are not cut shorter than this, mm.
 const SHORTEST: f64 = 1e-5;
@@ -102,7 +102,7 @@ impl JointPath {
                 pen_speed,
                 bend: 0.0,
                 near_corner: false,
-                slack: 0.0,
+                interpolation_error: 0.0,
             }],
         })
     }
@@ -163,14 +163,14 @@ impl GridInterval {
             (places.map(|place| place.0), places.map(|place| place.1))
         });
         // Of both halves, for where one of them has its bend change sign it shows none in its middle.
-        let bulges = parts.map(|(first, second)| bulge(machine, self.pen_speed, &first, &second));
-        let slack = 0.5 * bulges[0].max(bulges[1]);
+        let midpoint_errors = parts.map(|(first, second)| midpoint_error(machine, self.pen_speed, &first, &second));
+        let interpolation_error = 0.5 * midpoint_errors[0].max(midpoint_errors[1]);
         let half = |which: usize| {
             let (first, second) = parts[which];
             Self {
                 length: 0.5 * self.length,
                 start: self.start + 0.5 * which as f64 * self.length,
-                slack,
+                interpolation_error,
                 first,
                 second,
                 // What holds for all of the interval holds for its halves.
@@ -259,8 +259,8 @@ impl Lifter<'_> {
             let length = b.s - a.s;
             let first = [a.rates.first, middle.rates.first, b.rates.first];
             let second = [a.rates.second, middle.rates.second, b.rates.second];
-            let bulge = bulge(self.machine, a.rates.pen_speed.max(b.rates.pen_speed), &first, &second);
-            if length > SHORTEST && (bulge > LARGEST_BULGE || !self.is_near(length, &a, &middle, &b)) {
+            let midpoint_error = midpoint_error(self.machine, a.rates.pen_speed.max(b.rates.pen_speed), &first, &second);
+            if length > SHORTEST && (midpoint_error > LARGEST_MIDPOINT_ERROR || !self.is_near(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
                 continue;
@@ -284,27 +284,27 @@ impl Lifter<'_> {
                 pen_speed: most(|rates| rates.pen_speed),
                 bend: most(|rates| rates.bend),
                 near_corner: piece.near_corner,
-                slack: self.slack(piece, &a, &middle, &b)?,
+                interpolation_error: self.interpolation_error(piece, &a, &middle, &b)?,
             });
         }
         Ok(())
     }
 
     /// By how much the derivatives leave the straight lines between the three samples, looked at half way.
-    fn slack(&self, piece: &Piece, a: &Sample, middle: &Sample, b: &Sample) -> Result<f64, OutOfReach> {
+    fn interpolation_error(&self, piece: &Piece, a: &Sample, middle: &Sample, b: &Sample) -> Result<f64, OutOfReach> {
         let even = matches!(self.machine.geometry(), Geometry::Cartesian(_));
         if even && piece.curve.third_derivative(0.0) == Vec2::ZERO {
             return Ok(0.0);
         }
-        let mut slack = 0.0_f64;
+        let mut interpolation_error = 0.0_f64;
         for (from, to) in [(a, middle), (middle, b)] {
             let half_way = self.sample(piece, 0.5 * (from.s + to.s), from.pose)?.rates;
             let first = [from.rates.first, half_way.first, to.rates.first];
             let second = [from.rates.second, half_way.second, to.rates.second];
-            slack =
-                slack.max(bulge(self.machine, from.rates.pen_speed.max(to.rates.pen_speed), &first, &second));
+            interpolation_error =
+                interpolation_error.max(midpoint_error(self.machine, from.rates.pen_speed.max(to.rates.pen_speed), &first, &second));
         }
-        Ok(1.2 * slack)
+        Ok(1.2 * interpolation_error)
     }
 
     /// The most that a joint turns from one sample to the other, rad.
@@ -389,7 +389,7 @@ impl Rates {
 
 /// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
 /// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
-fn bulge(machine: &Machine, pen_speed: f64, first: &[MotorPos; 3], second: &[MotorPos; 3]) -> f64 {
+fn midpoint_error(machine: &Machine, pen_speed: f64, first: &[MotorPos; 3], second: &[MotorPos; 3]) -> f64 {
     let off = |x: [f64; 3]| (x[1] - 0.5 * (x[0] + x[2])).abs();
     let most = |x: [f64; 3]| x[0].abs().max(x[1].abs()).max(x[2].abs());
     let (mut slowness, mut slowness_off) = (0.0_f64, 0.0_f64);

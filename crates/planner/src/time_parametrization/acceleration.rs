@@ -167,7 +167,7 @@ impl Law {
                 continue;
             }
             // What the limits were lowered by for want of samples counts as idle too.
-            let idleness = constraints.idleness(from, to) + interval.slack;
+            let idleness = constraints.idleness(from, to) + interval.interpolation_error;
             // A motion with limits lower by a share takes longer by half of it.
             cost += 0.5 * idleness * own_time;
             let hangs = constraints.hangs_on_speed(from, to);
@@ -194,7 +194,7 @@ impl Law {
                 let second = 0.5 * (interval.second[half] + interval.second[half + 1]);
                 for (k, motor) in machine.motors().iter().enumerate() {
                     let acceleration = (first[k] * u + second[k] * b).abs();
-                    excess = excess.max(acceleration * (1.0 + interval.slack) / motor.max_acceleration_ticks_s2);
+                    excess = excess.max(acceleration * (1.0 + interval.interpolation_error) / motor.max_acceleration_ticks_s2);
                 }
             }
         }

@@ -7,7 +7,7 @@
 //! acceleration  |m' u + m'' b|   <= a      linear in (u, b)
 //! ```
 //! On a interval `u` is constant, so b is linear in s. The conditions are held at the interval's start, middle and end; by what m' and
-//! m'' may leave straight lines between those (the interval's [`GridInterval::slack`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the interval that is
+//! m'' may leave straight lines between those (the interval's [`GridInterval::interpolation_error`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the interval that is
 //! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
 //! two more near turns, where rows would cut them (see `path::slow_zones`).
 //!
@@ -70,7 +70,7 @@ impl IntervalConstraints {
         };
         lower(rows / interval.bend, Cap::Rows);
         for (k, motor) in machine.motors().iter().enumerate() {
-            let limit = motor.max_acceleration_ticks_s2 / (1.0 + interval.slack);
+            let limit = motor.max_acceleration_ticks_s2 / (1.0 + interval.interpolation_error);
             let mut fastest = 0.0_f64;
             for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
                 let (m1, m2) = (interval.first[j][k] / limit, interval.second[j][k] / limit);
@@ -78,7 +78,7 @@ impl IntervalConstraints {
                 strips[3 * k + j] = if p < 0.0 { Strip { p: -p, r: -m2 } } else { Strip { p, r: m2 } };
                 fastest = fastest.max(interval.first[j][k].abs());
             }
-            let speed = motor.max_speed_ticks_s / (fastest * (1.0 + interval.slack));
+            let speed = motor.max_speed_ticks_s / (fastest * (1.0 + interval.interpolation_error));
             lower(speed * speed, Cap::Motor(k));
         }
         if interval.near_corner {
