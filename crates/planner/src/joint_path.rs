@@ -63,7 +63,7 @@ const SHORTEST: f64 = 1e-5;
 
 /// The path's derivatives at one place.
 #[derive(Clone, Copy)]
-pub(crate) struct Rates {
+pub(crate) struct PathDerivatives {
     /// Of the motors.
     pub(crate) first: MotorPos,
     /// Likewise.
@@ -71,7 +71,7 @@ pub(crate) struct Rates {
     /// See [`GridInterval::pen_speed`].
     pub(crate) pen_speed: f64,
     /// Curvature times speed², 1/mm.
-    turning: f64,
+    normal_second_derivative: f64,
     /// See [`GridInterval::bend`].
     pub(crate) bend: f64,
 }
@@ -83,7 +83,7 @@ struct Sample {
     s: f64,
     point: Point,
     pose: JointPos,
-    rates: Rates,
+    derivatives: PathDerivatives,
 }
 
 impl JointPath {
@@ -257,9 +257,9 @@ impl Lifter<'_> {
         while let Some((a, b)) = pending.pop() {
             let middle = self.sample(piece, 0.5 * (a.s + b.s), a.pose)?;
             let length = b.s - a.s;
-            let first = [a.rates.first, middle.rates.first, b.rates.first];
-            let second = [a.rates.second, middle.rates.second, b.rates.second];
-            let midpoint_error = midpoint_error(self.machine, a.rates.pen_speed.max(b.rates.pen_speed), &first, &second);
+            let first = [a.derivatives.first, middle.derivatives.first, b.derivatives.first];
+            let second = [a.derivatives.second, middle.derivatives.second, b.derivatives.second];
+            let midpoint_error = midpoint_error(self.machine, a.derivatives.pen_speed.max(b.derivatives.pen_speed), &first, &second);
             if length > SHORTEST && (midpoint_error > LARGEST_MIDPOINT_ERROR || !self.is_near(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
@@ -273,8 +273,8 @@ impl Lifter<'_> {
                     fault: Fault::Singular { manipulability: 0.0, min },
                 });
             }
-            let samples = [&a.rates, &middle.rates, &b.rates];
-            let most = |of: fn(&Rates) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
+            let samples = [&a.derivatives, &middle.derivatives, &b.derivatives];
+            let most = |of: fn(&PathDerivatives) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
             self.intervals.push(GridInterval {
                 length,
                 piece: index,
@@ -298,11 +298,11 @@ impl Lifter<'_> {
         }
         let mut interpolation_error = 0.0_f64;
         for (from, to) in [(a, middle), (middle, b)] {
-            let half_way = self.sample(piece, 0.5 * (from.s + to.s), from.pose)?.rates;
-            let first = [from.rates.first, half_way.first, to.rates.first];
-            let second = [from.rates.second, half_way.second, to.rates.second];
+            let half_way = self.sample(piece, 0.5 * (from.s + to.s), from.pose)?.derivatives;
+            let first = [from.derivatives.first, half_way.first, to.derivatives.first];
+            let second = [from.derivatives.second, half_way.second, to.derivatives.second];
             interpolation_error =
-                interpolation_error.max(midpoint_error(self.machine, from.rates.pen_speed.max(to.rates.pen_speed), &first, &second));
+                interpolation_error.max(midpoint_error(self.machine, from.derivatives.pen_speed.max(to.derivatives.pen_speed), &first, &second));
         }
         Ok(1.2 * interpolation_error)
     }
@@ -316,7 +316,7 @@ impl Lifter<'_> {
 
     /// Whether the interval is short enough for linear joint motion.
     fn is_near(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
-        let turning = a.rates.turning.max(middle.rates.turning).max(b.rates.turning);
+        let turning = a.derivatives.normal_second_derivative.max(middle.derivatives.normal_second_derivative).max(b.derivatives.normal_second_derivative);
         let deviation = (self.machine.geometry().second_derivative_bound(&a.pose, &b.pose)
             + length * length * turning)
             / 8.0;
@@ -331,7 +331,7 @@ impl Lifter<'_> {
         if let Some(fault) = self.machine.joint_fault_between(&pose) {
             return Err(out(fault));
         }
-        Ok(Sample { s, point, pose, rates: Rates::of(self.machine, piece, t, &pose) })
+        Ok(Sample { s, point, pose, derivatives: PathDerivatives::of(self.machine, piece, t, &pose) })
     }
 }
 
@@ -369,7 +369,7 @@ pub(crate) fn third_derivative(machine: &Machine, piece: &Piece, t: f64, pose: &
     machine.motor_third_derivative(pose, rate * first, rate * rate * second, third)
 }
 
-impl Rates {
+impl PathDerivatives {
     /// At the curve's own parameter `t`, where the pose is `pose`.
     pub(crate) fn of(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> Self {
         let (velocity, acceleration) = piece.curve.derivatives(t);

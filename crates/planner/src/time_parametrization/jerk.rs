@@ -25,7 +25,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use super::polygon::Polygon;
 use super::{Phase, Profile, SpeedCap, acceleration, straight};
-use crate::joint_path::{PathGeometry, JointPath, Rates, third_derivative};
+use crate::joint_path::{PathGeometry, JointPath, PathDerivatives, third_derivative};
 use crate::path::Piece;
 
 /// How often b* is put where the speeds are.
@@ -91,7 +91,7 @@ impl PointConstraints {
     fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
         let t = (s * piece.rate).clamp(0.0, 1.0);
         let pose: JointPos = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
-        let Rates { first: m1, second: m2, pen_speed, bend, .. } = Rates::of(machine, piece, t, &pose);
+        let PathDerivatives { first: m1, second: m2, pen_speed, bend, .. } = PathDerivatives::of(machine, piece, t, &pose);
         let m3 = third_derivative(machine, piece, t, &pose);
         let motors = machine.motors();
         let of = |k: usize, m: &MotorPos, limit: f64| m[k] / limit;
