@@ -375,7 +375,7 @@ impl PathDerivatives {
         let (velocity, acceleration) = piece.curve.derivatives(t);
         let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let pen_speed = velocity.hypot2().sqrt();
-        let turning = velocity.cross(acceleration).abs() / pen_speed;
+        let normal_second_derivative = velocity.cross(acceleration).abs() / pen_speed;
         let geometry = machine.geometry();
         let (rates, _) = geometry.path_derivatives(pose, velocity, acceleration);
         let (first, second) = machine.motor_derivatives(pose, velocity, acceleration);
@@ -383,7 +383,7 @@ impl PathDerivatives {
         let bending =
             if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
         let bend = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
-        Self { first, second, pen_speed, turning, bend }
+        Self { first, second, pen_speed, normal_second_derivative, bend }
     }
 }
 
