@@ -43,8 +43,8 @@ pub struct GridInterval {
     /// Largest |dp/ds| of the pen.
     pub pen_speed: f64,
     /// Bound on how much the pen's path bends against linear joint motion, for a unit of (ds/dt)², 1/mm: rows `T` apart
-    /// at even speed leave the curve by `(ds/dt)² T² bend / 8` at the most.
-    pub bend: f64,
+    /// at even speed leave the curve by `(ds/dt)² T² second_derivative_bound / 8` at the most.
+    pub second_derivative_bound: f64,
     /// Whether rows also leave the curve by how the pen speeds up: by `|d²s/dt²| T² pen_speed / 8` more.
     pub near_corner: bool,
     /// By how much the derivatives may exceed a straight line between the three samples, as a share of the limits: 0
@@ -72,8 +72,8 @@ pub(crate) struct PathDerivatives {
     pub(crate) pen_speed: f64,
     /// Curvature times speed², 1/mm.
     normal_second_derivative: f64,
-    /// See [`GridInterval::bend`].
-    pub(crate) bend: f64,
+    /// See [`GridInterval::second_derivative_bound`].
+    pub(crate) second_derivative_bound: f64,
 }
 
 /// The path and its derivatives at one place.
@@ -100,7 +100,7 @@ impl JointPath {
                 first: [change; 3],
                 second: [MotorPos::ZERO; 3],
                 pen_speed,
-                bend: 0.0,
+                second_derivative_bound: 0.0,
                 near_corner: false,
                 interpolation_error: 0.0,
             }],
@@ -110,7 +110,7 @@ impl JointPath {
     /// Lifts a smooth section of the drawing, beginning at `pose`, which must hold the pen at its first point.
     ///
     /// Cells are bisected until (1) linear joint motion over a interval would stay within `tolerance` mm of the curve, by
-    /// the proved bound of [`kinematics::Geometry::bend`] plus the curve's own chord error; (2) no joint turns by more
+    /// the proved bound of [`kinematics::Geometry::second_derivative_bound`] plus the curve's own chord error; (2) no joint turns by more
     /// than 0.15 rad over it; (3) the motors' derivatives in its middle are within a fiftieth of the mean of its ends,
     /// as a share of what limits the pen.
     ///
@@ -162,7 +162,7 @@ impl GridInterval {
             let places = [places[from], places[from + 1], places[from + 2]];
             (places.map(|place| place.0), places.map(|place| place.1))
         });
-        // Of both halves, for where one of them has its bend change sign it shows none in its middle.
+        // Of both halves, for where one of them has its second_derivative_bound change sign it shows none in its middle.
         let midpoint_errors = parts.map(|(first, second)| midpoint_error(machine, self.pen_speed, &first, &second));
         let interpolation_error = 0.5 * midpoint_errors[0].max(midpoint_errors[1]);
         let half = |which: usize| {
@@ -282,7 +282,7 @@ impl Lifter<'_> {
                 first,
                 second,
                 pen_speed: most(|rates| rates.pen_speed),
-                bend: most(|rates| rates.bend),
+                second_derivative_bound: most(|rates| rates.second_derivative_bound),
                 near_corner: piece.near_corner,
                 interpolation_error: self.interpolation_error(piece, &a, &middle, &b)?,
             });
@@ -382,8 +382,8 @@ impl PathDerivatives {
         // Along a straight line an uneven parameter bends nothing; on a turn all of p'' may.
         let bending =
             if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
-        let bend = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
-        Self { first, second, pen_speed, normal_second_derivative, bend }
+        let second_derivative_bound = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
+        Self { first, second, pen_speed, normal_second_derivative, second_derivative_bound }
     }
 }
 

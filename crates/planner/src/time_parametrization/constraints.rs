@@ -68,7 +68,7 @@ impl IntervalConstraints {
                 (largest, capped_by) = (b, by);
             }
         };
-        lower(rows / interval.bend, Cap::Rows);
+        lower(rows / interval.second_derivative_bound, Cap::Rows);
         for (k, motor) in machine.motors().iter().enumerate() {
             let limit = motor.max_acceleration_ticks_s2 / (1.0 + interval.interpolation_error);
             let mut fastest = 0.0_f64;
@@ -82,8 +82,8 @@ impl IntervalConstraints {
             lower(speed * speed, Cap::Motor(k));
         }
         if interval.near_corner {
-            // |p'| |u| + bend b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
-            let (p, r) = (interval.pen_speed / rows, interval.bend / rows);
+            // |p'| |u| + second_derivative_bound b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
+            let (p, r) = (interval.pen_speed / rows, interval.second_derivative_bound / rows);
             strips[6] = Strip { p, r };
             strips[7] = Strip { p, r: -r };
         }

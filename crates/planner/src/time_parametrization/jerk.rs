@@ -84,14 +84,14 @@ struct PointConstraints {
     acceleration: [[f64; 2]; 2],
     jerk: [[f64; 3]; 2],
     pen_speed: f64,
-    bend: f64,
+    second_derivative_bound: f64,
 }
 
 impl PointConstraints {
     fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
         let t = (s * piece.rate).clamp(0.0, 1.0);
         let pose: JointPos = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
-        let PathDerivatives { first: m1, second: m2, pen_speed, bend, .. } = PathDerivatives::of(machine, piece, t, &pose);
+        let PathDerivatives { first: m1, second: m2, pen_speed, second_derivative_bound, .. } = PathDerivatives::of(machine, piece, t, &pose);
         let m3 = third_derivative(machine, piece, t, &pose);
         let motors = machine.motors();
         let of = |k: usize, m: &MotorPos, limit: f64| m[k] / limit;
@@ -101,7 +101,7 @@ impl PointConstraints {
             acceleration: [0, 1].map(|k| [&m1, &m2].map(|m| of(k, m, motors[k].max_acceleration_ticks_s2))),
             jerk: [0, 1].map(|k| [&m1, &m2, &m3].map(|m| of(k, m, jerk(k)))),
             pen_speed,
-            bend,
+            second_derivative_bound,
         })
     }
 
@@ -109,7 +109,7 @@ impl PointConstraints {
     fn cap(&self, cap: &SpeedCap) -> f64 {
         let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
         let speed = (cap.pen / self.pen_speed).min(1.0 / self.speed[0].abs()).min(1.0 / self.speed[1].abs());
-        (speed * speed).min(rows / self.bend)
+        (speed * speed).min(rows / self.second_derivative_bound)
     }
 
     /// Largest shares of the limits on acceleration and jerk.
@@ -134,7 +134,7 @@ struct JerkInterval {
     /// At its start, middle and end.
     points: [PointConstraints; 3],
     cap: f64,
-    /// On turns and near them the pen's |p'| |u| + bend b may be no more than this; otherwise infinite.
+    /// On turns and near them the pen's |p'| |u| + second_derivative_bound b may be no more than this; otherwise infinite.
     row_limit: f64,
     /// b* at its start, middle and end.
     tangent_points: [f64; 3],
@@ -194,7 +194,7 @@ impl JerkInterval {
             }
             if self.row_limit.is_finite() {
                 for sign in [1.0, -1.0] {
-                    hold(point.bend, 0.5 * sign * point.pen_speed, 0.0, self.row_limit);
+                    hold(point.second_derivative_bound, 0.5 * sign * point.pen_speed, 0.0, self.row_limit);
                 }
             }
         }
@@ -217,7 +217,7 @@ impl JerkInterval {
                 most = most.min(libm::cbrt(by * by));
             }
             if self.row_limit.is_finite() {
-                most = most.min(self.row_limit / (point.pen_speed * 2.0 / (3.0 * h) + point.bend));
+                most = most.min(self.row_limit / (point.pen_speed * 2.0 / (3.0 * h) + point.second_derivative_bound));
             }
         }
         most
@@ -321,9 +321,9 @@ fn set_lower_bounds(intervals: &mut [JerkInterval]) {
     for interval in intervals.iter_mut() {
         let most = |of: &dyn Fn(&PointConstraints) -> f64| interval.points.iter().map(of).fold(0.0, f64::max);
         let turn = most(&|point| point.jerk[0][2].abs().max(point.jerk[1][2].abs()));
-        let bend = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
+        let second_derivative_bound = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
         let rest = interval.points[0].initial_tangent_point(interval.cap, at.min(total - at));
-        interval.lower_bound = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / bend).min(interval.cap);
+        interval.lower_bound = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / second_derivative_bound).min(interval.cap);
         at += interval.length;
     }
     let steps = |interval: &JerkInterval, b: f64| {
@@ -576,8 +576,8 @@ fn build_profile(
 /// The largest of some even samples, or the top of the parabola through three of them.
 fn peak<const N: usize>(samples: [f64; N]) -> f64 {
     let top = |w: &[f64]| {
-        let (slope, bend) = (0.5 * (w[2] - w[0]), 2.0 * w[1] - w[0] - w[2]);
-        if slope.abs() < bend { w[1] + 0.5 * slope * slope / bend } else { w[1] }
+        let (slope, second_derivative_bound) = (0.5 * (w[2] - w[0]), 2.0 * w[1] - w[0] - w[2]);
+        if slope.abs() < second_derivative_bound { w[1] + 0.5 * slope * slope / second_derivative_bound } else { w[1] }
     };
     samples.windows(3).map(top).fold(samples[0].max(samples[N - 1]), f64::max)
 }
@@ -593,7 +593,7 @@ fn record_active_constraint(interval: &JerkInterval, from: State, to: State, exc
         let fastest = [0, 1].map(|k| point.speed[k] * point.speed[k] * interval.cap);
         if fastest[0].max(fastest[1]) > 0.999 {
             limiting.speed[usize::from(fastest[1] > fastest[0])] += duration;
-        } else if point.bend * interval.cap > 0.999 * interval.row_limit {
+        } else if point.second_derivative_bound * interval.cap > 0.999 * interval.row_limit {
             limiting.rows += duration;
         } else {
             limiting.pen += duration;
