@@ -148,7 +148,7 @@ fn speed() -> Result<String, Failure> {
     for section in sections(&stroke, &budget) {
         let pose =
             machine.pose_near(section[0].curve.start(), &machine.start()).map_err(|_| "out of reach")?;
-        let path = JointPath::lift(&machine, section, pose, 0.05)?;
+        let path = JointPath::from_section(&machine, section, pose, 0.05)?;
         let PathGeometry::Drawn(_, section) = &path.geometry else { return Err("strokes are drawn".into()) };
         let mut at = way;
         for interval in &path.intervals {

@@ -116,27 +116,27 @@ impl JointPath {
     ///
     /// # Errors
     /// When a point of it is out of reach, outside the joint limits or nearly singular.
-    pub fn lift(
+    pub fn from_section(
         machine: &Machine,
         section: Section,
         pose: JointPos,
         tolerance: f64,
     ) -> Result<Self, OutOfReach> {
-        let mut lifter = Lifter { machine, tolerance, intervals: Vec::with_capacity(section.len()) };
+        let mut builder = Builder { machine, tolerance, intervals: Vec::with_capacity(section.len()) };
         let mut near = pose;
         for (index, piece) in section.iter().enumerate() {
             machine.check_segment(&piece.curve)?;
-            near = lifter.piece(index, piece, near)?;
+            near = builder.add_piece(index, piece, near)?;
         }
-        Ok(Self { geometry: PathGeometry::Drawn(pose, section), intervals: lifter.intervals })
+        Ok(Self { geometry: PathGeometry::Drawn(pose, section), intervals: builder.intervals })
     }
 }
 
 impl GridInterval {
     /// The interval, cut in two so many times over.
-    pub(crate) fn cut(&self, machine: &Machine, geometry: &PathGeometry, times: u32, to: &mut Vec<Self>) {
+    pub(crate) fn subdivide(&self, machine: &Machine, geometry: &PathGeometry, times: u32, to: &mut Vec<Self>) {
         match if times > 0 { self.halves(machine, geometry) } else { None } {
-            Some(halves) => halves.iter().for_each(|half| half.cut(machine, geometry, times - 1, to)),
+            Some(halves) => halves.iter().for_each(|half| half.subdivide(machine, geometry, times - 1, to)),
             None => to.push(*self),
         }
     }
@@ -215,7 +215,7 @@ impl PathGeometry {
     }
 }
 
-struct Lifter<'a> {
+struct Builder<'a> {
     machine: &'a Machine,
     tolerance: f64,
     intervals: Vec<GridInterval>,
@@ -223,7 +223,7 @@ struct Lifter<'a> {
 
 /// How many intervals a curve begins with: enough that the three samples of a interval cannot miss a wave, and that a time law
 /// with one acceleration a interval comes near to the best.
-fn first_cells(piece: &Piece) -> usize {
+fn initial_interval_count(piece: &Piece) -> usize {
     match &piece.curve {
         Segment::Line(_) => 1,
         Segment::Arc(arc) => (arc.sweep_rad.abs() / 0.2).ceil().clamp(2.0, 1e6) as usize,
@@ -236,22 +236,22 @@ fn first_cells(piece: &Piece) -> usize {
     }
 }
 
-impl Lifter<'_> {
+impl Builder<'_> {
     /// Lifts one piece and gives the pose at its end.
-    fn piece(&mut self, index: usize, piece: &Piece, near: JointPos) -> Result<JointPos, OutOfReach> {
-        let parts = first_cells(piece);
+    fn add_piece(&mut self, index: usize, piece: &Piece, near: JointPos) -> Result<JointPos, OutOfReach> {
+        let parts = initial_interval_count(piece);
         let length = piece.length();
         let mut from = self.sample(piece, 0.0, near)?;
         for part in 1..=parts {
             let to = self.sample(piece, length * (part as f64 / parts as f64), from.pose)?;
-            self.interval(index, piece, from, to)?;
+            self.add_interval(index, piece, from, to)?;
             from = to;
         }
         Ok(from.pose)
     }
 
     /// Adds the intervals between two samples, bisecting as long as one interval would not do.
-    fn interval(&mut self, index: usize, piece: &Piece, from: Sample, to: Sample) -> Result<(), OutOfReach> {
+    fn add_interval(&mut self, index: usize, piece: &Piece, from: Sample, to: Sample) -> Result<(), OutOfReach> {
         // An explicit stack keeps the order and bounds the memory.
         let mut pending = vec![(from, to)];
         while let Some((a, b)) = pending.pop() {
@@ -260,13 +260,13 @@ impl Lifter<'_> {
             let first = [a.derivatives.first, middle.derivatives.first, b.derivatives.first];
             let second = [a.derivatives.second, middle.derivatives.second, b.derivatives.second];
             let midpoint_error = midpoint_error(self.machine, a.derivatives.pen_speed.max(b.derivatives.pen_speed), &first, &second);
-            if length > SHORTEST && (midpoint_error > LARGEST_MIDPOINT_ERROR || !self.is_near(length, &a, &middle, &b)) {
+            if length > SHORTEST && (midpoint_error > LARGEST_MIDPOINT_ERROR || !self.is_within_limits(length, &a, &middle, &b)) {
                 pending.push((middle, b));
                 pending.push((a, middle));
                 continue;
             }
             // Only at a singular pose can a joint still jump over so short a way.
-            if self.turned(&a, &b) > 1.0 {
+            if self.joint_change(&a, &b) > 1.0 {
                 let min = self.machine.parts().min_manipulability;
                 return Err(OutOfReach {
                     point: b.point,
@@ -308,19 +308,19 @@ impl Lifter<'_> {
     }
 
     /// The most that a joint turns from one sample to the other, rad.
-    fn turned(&self, a: &Sample, b: &Sample) -> f64 {
+    fn joint_change(&self, a: &Sample, b: &Sample) -> f64 {
         let angles = self.machine.geometry().joint_is_angle();
         let of = |k: usize| if angles[k] { (b.pose[k] - a.pose[k]).abs() } else { 0.0 };
         of(0).max(of(1))
     }
 
     /// Whether the interval is short enough for linear joint motion.
-    fn is_near(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
+    fn is_within_limits(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
         let turning = a.derivatives.normal_second_derivative.max(middle.derivatives.normal_second_derivative).max(b.derivatives.normal_second_derivative);
         let deviation = (self.machine.geometry().second_derivative_bound(&a.pose, &b.pose)
             + length * length * turning)
             / 8.0;
-        self.turned(a, b) <= LARGEST_TURN && deviation <= self.tolerance
+        self.joint_change(a, b) <= LARGEST_TURN && deviation <= self.tolerance
     }
 
     fn sample(&self, piece: &Piece, s: f64, near: JointPos) -> Result<Sample, OutOfReach> {

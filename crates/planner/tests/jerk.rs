@@ -37,7 +37,7 @@ fn time(machine: &Machine, stroke: &Stroke) -> f64 {
     for section in sections(stroke, &BUDGET) {
         let (start, end) = (section[0].curve.start(), section[section.len() - 1].curve.end());
         let pose = machine.pose_near(start, &near).expect("within reach");
-        let path = JointPath::lift(machine, section, pose, 0.1).expect("within reach");
+        let path = JointPath::from_section(machine, section, pose, 0.1).expect("within reach");
         let cap = SpeedCap { pen: 60.0, row_deviation: f64::INFINITY, period: 1e-3 };
         time += profile(machine, &path, &cap).duration;
         near = machine.pose_near(end, &pose).expect("within reach");

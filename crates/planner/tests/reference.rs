@@ -256,7 +256,7 @@ fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
     for section in sections(stroke, &BUDGET) {
         let (start, end) = (section[0].curve.start(), section[section.len() - 1].curve.end());
         let pose = machine.pose_near(start, &near).expect("within reach");
-        paths.push(JointPath::lift(machine, section, pose, 0.1).expect("within reach"));
+        paths.push(JointPath::from_section(machine, section, pose, 0.1).expect("within reach"));
         near = machine.pose_near(end, &pose).expect("within reach");
     }
     paths

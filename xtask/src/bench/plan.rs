@@ -299,7 +299,7 @@ impl Stages {
                 let pose = machine
                     .poses(section[0].curve.start(), &machine.start())
                     .map_err(|fault| anyhow::anyhow!("{fault}"))?;
-                Ok(JointPath::lift(machine, section.clone(), pose[0], TOLERANCE)?)
+                Ok(JointPath::from_section(machine, section.clone(), pose[0], TOLERANCE)?)
             });
             lifted.collect::<Result<Vec<JointPath>>>()
         });

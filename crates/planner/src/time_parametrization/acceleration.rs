@@ -132,7 +132,7 @@ impl Law {
             order.clear();
             for (index, cuts) in self.order.iter().zip(cuts) {
                 finer.clear();
-                self.intervals[*index].interval.cut(machine, geometry, cuts, &mut finer);
+                self.intervals[*index].interval.subdivide(machine, geometry, cuts, &mut finer);
                 if finer.len() > 1 {
                     order.extend(self.intervals.len()..self.intervals.len() + finer.len());
                     let hold = |interval: &GridInterval| Held { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
