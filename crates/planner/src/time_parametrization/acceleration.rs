@@ -14,7 +14,7 @@ use kinematics::Machine;
 use super::{Profile, SpeedCap, constraints::IntervalConstraints};
 use crate::joint_path::{GridInterval, PathGeometry, JointPath};
 
-/// How many of the path's own intervals are refined together: memory and cost follow it, and its ends are held to the
+/// How many of the path's own intervals are refined together: memory and cost follow it, and its ends are interval to the
 /// speeds of the coarse law.
 const WINDOW: usize = 256;
 
@@ -62,7 +62,7 @@ pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Prof
 
 /// A interval with its conditions.
 #[derive(Clone)]
-struct Held {
+struct ConstrainedInterval {
     interval: GridInterval,
     constraints: IntervalConstraints,
 }
@@ -70,7 +70,7 @@ struct Held {
 /// The fastest way over some intervals.
 #[derive(Default)]
 struct Law {
-    intervals: Vec<Held>,
+    intervals: Vec<ConstrainedInterval>,
     /// The intervals' order along the path, as indices.
     order: Vec<usize>,
     /// b at every node.
@@ -80,7 +80,7 @@ struct Law {
 impl Law {
     /// Over all of a path, from rest to rest.
     fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
-        let hold = |interval: &GridInterval| Held { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
+        let hold = |interval: &GridInterval| ConstrainedInterval { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
         let mut law = Self { intervals: path.intervals.iter().map(hold).collect(), ..Self::default() };
         law.sweep(0.0, 0.0);
         law
@@ -95,13 +95,13 @@ impl Law {
     }
 
     /// Every interval with b at its start and end.
-    fn runs(&self) -> impl Iterator<Item = (&Held, f64, f64)> {
+    fn runs(&self) -> impl Iterator<Item = (&ConstrainedInterval, f64, f64)> {
         let intervals = self.order.iter().map(|index| &self.intervals[*index]);
-        intervals.zip(self.nodes.windows(2)).map(|(held, b)| (held, b[0], b[1]))
+        intervals.zip(self.nodes.windows(2)).map(|(interval, b)| (interval, b[0], b[1]))
     }
 
     fn time(&self) -> f64 {
-        self.runs().map(|(held, from, to)| held.constraints.time(from, to)).sum()
+        self.runs().map(|(interval, from, to)| interval.constraints.time(from, to)).sum()
     }
 
     /// The node at which a window that is to end at `wanted` should: where the law is nearest to the largest speed, or on
@@ -135,14 +135,14 @@ impl Law {
                 self.intervals[*index].interval.subdivide(machine, geometry, cuts, &mut finer);
                 if finer.len() > 1 {
                     order.extend(self.intervals.len()..self.intervals.len() + finer.len());
-                    let hold = |interval: &GridInterval| Held { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
+                    let hold = |interval: &GridInterval| ConstrainedInterval { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
                     self.intervals.extend(finer.iter().map(hold));
                 } else {
                     order.push(*index);
                 }
             }
             sweeps(&self.intervals, &order, start, end, &mut nodes);
-            // The finer intervals' conditions are held in more places, so in rare cases the speed given is too high for them.
+            // The finer intervals' conditions are interval in more places, so in rare cases the speed given is too high for them.
             if order.len() == self.order.len() || nodes[0] < start {
                 break;
             }
@@ -160,7 +160,7 @@ impl Law {
     fn cuts(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
         let mut cuts = Vec::with_capacity(self.order.len());
         let (mut cost, mut hanging) = (0.0, false);
-        for (Held { constraints, interval }, from, to) in self.runs() {
+        for (ConstrainedInterval { constraints, interval }, from, to) in self.runs() {
             let own_time = constraints.time(from, to);
             if own_time < shortest {
                 cuts.push(0);
@@ -180,13 +180,13 @@ impl Law {
         (!time.is_finite() || hanging || cost > IDLE_COST * time).then_some(cuts)
     }
 
-    /// How many times its limit a motor's acceleration may be between the places where it was held to it, at least 1.
+    /// How many times its limit a motor's acceleration may be between the places where it was interval to it, at least 1.
     ///
     /// With m'' and b linear between them, `m' u + m'' b` is a parabola: its distance from a straight line is largest half
     /// way. That is a few millionths as a rule; the motion is made slower by as much.
     fn excess(&self, machine: &Machine) -> f64 {
         let mut excess = 1.0_f64;
-        for (Held { interval, .. }, from, to) in self.runs() {
+        for (ConstrainedInterval { interval, .. }, from, to) in self.runs() {
             let u = 0.5 * (to - from) / interval.length;
             for (half, share) in [0.25, 0.75].into_iter().enumerate() {
                 let b = from + share * (to - from);
@@ -202,14 +202,14 @@ impl Law {
     }
 
     fn emit(&self, profile: &mut Profile) {
-        for (held, from, to) in self.runs() {
-            held.constraints.phases(&held.interval, from, to, profile);
+        for (interval, from, to) in self.runs() {
+            interval.constraints.phases(&interval.interval, from, to, profile);
         }
     }
 }
 
 /// b at every node: backward from where the end can still be reached, forward as fast as that allows.
-fn sweeps(intervals: &[Held], order: &[usize], start: f64, end: f64, nodes: &mut Vec<f64>) {
+fn sweeps(intervals: &[ConstrainedInterval], order: &[usize], start: f64, end: f64, nodes: &mut Vec<f64>) {
     nodes.clear();
     nodes.resize(order.len() + 1, end);
     for (k, index) in order.iter().enumerate().rev() {
