@@ -34,9 +34,9 @@ const SHORTEST: f64 = 1.0 / 16.0;
 const ROUNDS: usize = 8;
 
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    let coarse = Law::of(machine, path, cap);
+    let coarse = Grid::of(machine, path, cap);
     let mut profile = Profile::new();
-    let mut window = Law::default();
+    let mut window = Grid::default();
     let (mut from, mut speed, mut slower) = (0, 0.0, 1.0_f64);
     while from < path.intervals.len() {
         let to = coarse.window_end(from + WINDOW);
@@ -45,7 +45,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
         window.sweep(speed, coarse.nodes[to]);
         window.refine(machine, &path.geometry, cap);
         speed = window.nodes[window.order.len()];
-        slower = slower.max(window.excess(machine).sqrt());
+        slower = slower.max(window.limit_excess(machine).sqrt());
         window.emit(&mut profile);
         from = to;
     }
@@ -55,9 +55,9 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
 /// With no more intervals than the path has, but for such as begin and end at rest.
 pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     let mut profile = Profile::new();
-    let law = Law::of(machine, path, cap);
-    law.emit(&mut profile);
-    profile.slowed(law.excess(machine).sqrt())
+    let grid = Grid::of(machine, path, cap);
+    grid.emit(&mut profile);
+    profile.slowed(grid.limit_excess(machine).sqrt())
 }
 
 /// A interval with its conditions.
@@ -69,7 +69,7 @@ struct ConstrainedInterval {
 
 /// The fastest way over some intervals.
 #[derive(Default)]
-struct Law {
+struct Grid {
     intervals: Vec<ConstrainedInterval>,
     /// The intervals' order along the path, as indices.
     order: Vec<usize>,
@@ -77,13 +77,13 @@ struct Law {
     nodes: Vec<f64>,
 }
 
-impl Law {
+impl Grid {
     /// Over all of a path, from rest to rest.
     fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
         let hold = |interval: &GridInterval| ConstrainedInterval { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
-        let mut law = Self { intervals: path.intervals.iter().map(hold).collect(), ..Self::default() };
-        law.sweep(0.0, 0.0);
-        law
+        let mut grid = Self { intervals: path.intervals.iter().map(hold).collect(), ..Self::default() };
+        grid.sweep(0.0, 0.0);
+        grid
     }
 
     /// Finds b at every node of all intervals in a row: from `start`, or the largest b from which there is a way if that is
@@ -95,13 +95,13 @@ impl Law {
     }
 
     /// Every interval with b at its start and end.
-    fn runs(&self) -> impl Iterator<Item = (&ConstrainedInterval, f64, f64)> {
+    fn solved_intervals(&self) -> impl Iterator<Item = (&ConstrainedInterval, f64, f64)> {
         let intervals = self.order.iter().map(|index| &self.intervals[*index]);
         intervals.zip(self.nodes.windows(2)).map(|(interval, b)| (interval, b[0], b[1]))
     }
 
     fn time(&self) -> f64 {
-        self.runs().map(|(interval, from, to)| interval.constraints.time(from, to)).sum()
+        self.solved_intervals().map(|(interval, from, to)| interval.constraints.time(from, to)).sum()
     }
 
     /// The node at which a window that is to end at `wanted` should: where the law is nearest to the largest speed, or on
@@ -110,14 +110,14 @@ impl Law {
         if wanted + WINDOW / 4 >= self.intervals.len() {
             return self.intervals.len();
         }
-        let room = |k: usize| {
+        let headroom = |k: usize| {
             let (before, after) = (&self.intervals[k - 1], &self.intervals[k]);
             let straight = before.interval.is_straight() && after.interval.is_straight();
             if straight { 2.0 } else { self.nodes[k] / before.constraints.cap.min(after.constraints.cap) }
         };
         let best = (wanted..wanted + WINDOW / 4).fold((wanted, 0.0), |best, k| {
-            let room = room(k);
-            if room > best.1 { (k, room) } else { best }
+            let headroom = headroom(k);
+            if headroom > best.1 { (k, headroom) } else { best }
         });
         best.0
     }
@@ -128,11 +128,11 @@ impl Law {
         let mut time = self.time();
         let (mut order, mut nodes, mut finer) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
-            let Some(cuts) = self.cuts(time, SHORTEST * cap.period) else { break };
+            let Some(subdivisions) = self.subdivisions(time, SHORTEST * cap.period) else { break };
             order.clear();
-            for (index, cuts) in self.order.iter().zip(cuts) {
+            for (index, subdivisions) in self.order.iter().zip(subdivisions) {
                 finer.clear();
-                self.intervals[*index].interval.subdivide(machine, geometry, cuts, &mut finer);
+                self.intervals[*index].interval.subdivide(machine, geometry, subdivisions, &mut finer);
                 if finer.len() > 1 {
                     order.extend(self.intervals.len()..self.intervals.len() + finer.len());
                     let hold = |interval: &GridInterval| ConstrainedInterval { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
@@ -157,13 +157,13 @@ impl Law {
 
     /// How often each interval that takes longer than `shortest` is to be cut in two because its motors idle; nothing if that
     /// costs next to no `time`.
-    fn cuts(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
-        let mut cuts = Vec::with_capacity(self.order.len());
+    fn subdivisions(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
+        let mut subdivisions = Vec::with_capacity(self.order.len());
         let (mut cost, mut hanging) = (0.0, false);
-        for (ConstrainedInterval { constraints, interval }, from, to) in self.runs() {
+        for (ConstrainedInterval { constraints, interval }, from, to) in self.solved_intervals() {
             let own_time = constraints.time(from, to);
             if own_time < shortest {
-                cuts.push(0);
+                subdivisions.push(0);
                 continue;
             }
             // What the limits were lowered by for want of samples counts as idle too.
@@ -175,18 +175,18 @@ impl Law {
             // Half the length, half the idleness.
             let thresholds = [IDLE, 3.0 * IDLE, 6.0 * IDLE];
             let idle = thresholds.iter().filter(|threshold| idleness > **threshold).count() as u32;
-            cuts.push(idle.max(u32::from(hangs)));
+            subdivisions.push(idle.max(u32::from(hangs)));
         }
-        (!time.is_finite() || hanging || cost > IDLE_COST * time).then_some(cuts)
+        (!time.is_finite() || hanging || cost > IDLE_COST * time).then_some(subdivisions)
     }
 
     /// How many times its limit a motor's acceleration may be between the places where it was interval to it, at least 1.
     ///
     /// With m'' and b linear between them, `m' u + m'' b` is a parabola: its distance from a straight line is largest half
     /// way. That is a few millionths as a rule; the motion is made slower by as much.
-    fn excess(&self, machine: &Machine) -> f64 {
+    fn limit_excess(&self, machine: &Machine) -> f64 {
         let mut excess = 1.0_f64;
-        for (ConstrainedInterval { interval, .. }, from, to) in self.runs() {
+        for (ConstrainedInterval { interval, .. }, from, to) in self.solved_intervals() {
             let u = 0.5 * (to - from) / interval.length;
             for (half, share) in [0.25, 0.75].into_iter().enumerate() {
                 let b = from + share * (to - from);
@@ -202,7 +202,7 @@ impl Law {
     }
 
     fn emit(&self, profile: &mut Profile) {
-        for (interval, from, to) in self.runs() {
+        for (interval, from, to) in self.solved_intervals() {
             interval.constraints.phases(&interval.interval, from, to, profile);
         }
     }
