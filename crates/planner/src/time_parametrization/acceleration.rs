@@ -19,13 +19,13 @@ use crate::joint_path::{GridInterval, PathGeometry, JointPath};
 const WINDOW: usize = 256;
 
 /// Cells are refined until idle motors cost no more than this share of the time...
-const IDLE_COST: f64 = 4e-4;
+const UNUSED_COST: f64 = 4e-4;
 
 /// ... or until cutting them in two brings no more than this share.
 const LEAST_GAIN: f64 = 1e-4;
 
 /// A interval is not cut if its motors idle by less than this share of their limits.
-const IDLE: f64 = 2e-3;
+const UNUSED: f64 = 2e-3;
 
 /// Cells that take less than this share of the time between rows are not cut: nobody would see where in it motors idle.
 const SHORTEST: f64 = 1.0 / 16.0;
@@ -159,7 +159,7 @@ impl Grid {
     /// costs next to no `time`.
     fn subdivisions(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
         let mut subdivisions = Vec::with_capacity(self.order.len());
-        let (mut cost, mut hanging) = (0.0, false);
+        let (mut cost, mut near_zero_inertia) = (0.0, false);
         for (ConstrainedInterval { constraints, interval }, from, to) in self.solved_intervals() {
             let own_time = constraints.time(from, to);
             if own_time < shortest {
@@ -167,17 +167,17 @@ impl Grid {
                 continue;
             }
             // What the limits were lowered by for want of samples counts as idle too.
-            let idleness = constraints.idleness(from, to) + interval.interpolation_error;
+            let unused_capacity = constraints.unused_capacity(from, to) + interval.interpolation_error;
             // A motion with limits lower by a share takes longer by half of it.
-            cost += 0.5 * idleness * own_time;
-            let hangs = constraints.hangs_on_speed(from, to);
-            hanging |= hangs;
-            // Half the length, half the idleness.
-            let thresholds = [IDLE, 3.0 * IDLE, 6.0 * IDLE];
-            let idle = thresholds.iter().filter(|threshold| idleness > **threshold).count() as u32;
-            subdivisions.push(idle.max(u32::from(hangs)));
+            cost += 0.5 * unused_capacity * own_time;
+            let is_near = constraints.is_near_zero_inertia_point(from, to);
+            near_zero_inertia |= is_near;
+            // Half the length, half the unused_capacity.
+            let thresholds = [UNUSED, 3.0 * UNUSED, 6.0 * UNUSED];
+            let count = thresholds.iter().filter(|threshold| unused_capacity > **threshold).count() as u32;
+            subdivisions.push(count.max(u32::from(is_near)));
         }
-        (!time.is_finite() || hanging || cost > IDLE_COST * time).then_some(subdivisions)
+        (!time.is_finite() || near_zero_inertia || cost > UNUSED_COST * time).then_some(subdivisions)
     }
 
     /// How many times its limit a motor's acceleration may be between the places where it was interval to it, at least 1.

@@ -112,22 +112,22 @@ impl IntervalConstraints {
 
     /// By how much the motors stay below their limits over the interval with an even acceleration, as a share of them; 0 if
     /// nothing could be gained by cutting it.
-    pub(super) fn idleness(&self, b0: f64, b1: f64) -> f64 {
+    pub(super) fn unused_capacity(&self, b0: f64, b1: f64) -> f64 {
         if self.is_straight() {
             return 0.0;
         }
         let of = |share: f64, at: usize| {
             let b = b0 + share * (b1 - b0);
-            1.0 - self.use_of(b0, b1, &[at, 3 + at, 6, 7]).1.max(b / self.cap)
+            1.0 - self.active_constraint(b0, b1, &[at, 3 + at, 6, 7]).1.max(b / self.cap)
         };
         (of(0.0, 0) + of(0.5, 1) + of(1.0, 2)) / 3.0
     }
 
-    /// Whether a motor that is used hangs on the speed rather than on the acceleration: near a place where its m' vanishes
+    /// Whether a motor that is used is_near on the speed rather than on the acceleration: near a place where its m' vanishes
     /// (a zero-inertia point) a larger b at the start of a interval allows only a smaller one at its end, so going as fast
     /// as possible up to there is not the fastest way. With `b1 = b + twice (1 - r b) / p` that begins at `twice r = p`;
     /// the shorter the intervals, the narrower that region.
-    pub(super) fn hangs_on_speed(&self, b0: f64, b1: f64) -> bool {
+    pub(super) fn is_near_zero_inertia_point(&self, b0: f64, b1: f64) -> bool {
         let u = (b1 - b0) / self.twice;
         self.strips[..6].iter().any(|strip| {
             self.twice * strip.r.abs() > 0.5 * strip.p && (strip.p * u + strip.r * b0).abs() > 0.5
@@ -135,7 +135,7 @@ impl IntervalConstraints {
     }
 
     /// Of some strips the one that is used most from b0 to b1, and by how much of its width.
-    fn use_of(&self, b0: f64, b1: f64, strips: &[usize]) -> (usize, f64) {
+    fn active_constraint(&self, b0: f64, b1: f64, strips: &[usize]) -> (usize, f64) {
         let u = (b1 - b0) / self.twice;
         let uses = strips.iter().map(|&index| {
             let strip = &self.strips[index];
@@ -211,7 +211,7 @@ impl IntervalConstraints {
 
     /// Books the time of a ramp to what is nearest to its limit.
     fn limit(&self, b0: f64, b1: f64, duration: f64, limiting: &mut Limiting) {
-        let (strip, most) = self.use_of(b0, b1, &[0, 1, 2, 3, 4, 5, 6, 7]);
+        let (strip, most) = self.active_constraint(b0, b1, &[0, 1, 2, 3, 4, 5, 6, 7]);
         if b0.max(b1) / self.cap >= most {
             match self.capped_by {
                 Cap::Pen => limiting.pen += duration,
