@@ -215,9 +215,9 @@ fn sweeps(intervals: &[ConstrainedInterval], order: &[usize], start: f64, end: f
     for (k, index) in order.iter().enumerate().rev() {
         let constraints = &intervals[*index].constraints;
         let before = if k > 0 { intervals[order[k - 1]].constraints.cap } else { start };
-        nodes[k] = constraints.largest(nodes[k + 1]).min(before);
+        nodes[k] = constraints.largest_start(nodes[k + 1]).min(before);
     }
     for (k, index) in order.iter().enumerate() {
-        nodes[k + 1] = intervals[*index].constraints.fastest(nodes[k], nodes[k + 1]);
+        nodes[k + 1] = intervals[*index].constraints.largest_end(nodes[k], nodes[k + 1]);
     }
 }

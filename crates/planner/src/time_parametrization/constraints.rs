@@ -30,19 +30,19 @@ struct Strip {
 pub(super) struct IntervalConstraints {
     /// Three of each motor, at the interval's start, middle and end, and two near turns.
     strips: [Strip; 8],
-    /// Twice the interval's length: b at its end is `b + twice * u`.
-    twice: f64,
+    /// Twice the interval's length: b at its end is `b + two_h * u`.
+    two_h: f64,
     /// The largest b anywhere on it by speed.
     pub(super) cap: f64,
     /// The largest b at its start for which some u fulfils the conditions, wherever that leads.
     top: f64,
     /// Whose speed `cap` is.
-    capped_by: Cap,
+    capped_by: SpeedLimit,
 }
 
 /// What caps the speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Cap {
+enum SpeedLimit {
     Pen,
     Rows,
     Motor(usize),
@@ -50,9 +50,9 @@ enum Cap {
 
 /// How a interval is run through.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Run {
+enum SpeedShape {
     /// With one acceleration.
-    Even,
+    Ramp,
     /// Up to this b over a length, along at it, and down again over another length.
     Peak { b: f64, up: f64, down: f64 },
 }
@@ -62,13 +62,13 @@ impl IntervalConstraints {
         let mut strips = [Strip::default(); 8];
         let pen = cap.pen / interval.pen_speed;
         let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
-        let (mut largest, mut capped_by) = (pen * pen, Cap::Pen);
-        let mut lower = |b: f64, by: Cap| {
+        let (mut largest, mut capped_by) = (pen * pen, SpeedLimit::Pen);
+        let mut lower = |b: f64, by: SpeedLimit| {
             if b < largest {
                 (largest, capped_by) = (b, by);
             }
         };
-        lower(rows / interval.second_derivative_bound, Cap::Rows);
+        lower(rows / interval.second_derivative_bound, SpeedLimit::Rows);
         for (k, motor) in machine.motors().iter().enumerate() {
             let limit = motor.max_acceleration_ticks_s2 / (1.0 + interval.interpolation_error);
             let mut fastest = 0.0_f64;
@@ -79,7 +79,7 @@ impl IntervalConstraints {
                 fastest = fastest.max(interval.first[j][k].abs());
             }
             let speed = motor.max_speed_ticks_s / (fastest * (1.0 + interval.interpolation_error));
-            lower(speed * speed, Cap::Motor(k));
+            lower(speed * speed, SpeedLimit::Motor(k));
         }
         if interval.near_corner {
             // |p'| |u| + second_derivative_bound b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
@@ -87,27 +87,27 @@ impl IntervalConstraints {
             strips[6] = Strip { p, r };
             strips[7] = Strip { p, r: -r };
         }
-        let twice = 2.0 * interval.length;
-        let top = highest(if interval.near_corner { &strips } else { &strips[..6] }, twice).min(largest);
-        Self { strips, twice, cap: largest, top, capped_by }
+        let two_h = 2.0 * interval.length;
+        let top = largest_feasible(if interval.near_corner { &strips } else { &strips[..6] }, two_h).min(largest);
+        Self { strips, two_h, cap: largest, top, capped_by }
     }
 
     /// The largest b at the start for which some u fulfils all conditions and leads into [0, next].
-    pub(super) fn largest(&self, next: f64) -> f64 {
-        // (-1 - r b) / p <= (next - b) / twice: the end is not too fast.
+    pub(super) fn largest_start(&self, next: f64) -> f64 {
+        // (-1 - r b) / p <= (next - b) / two_h: the end is not too fast.
         let most = |strip: &Strip| {
-            let slope = strip.p - self.twice * strip.r;
-            if slope > 0.0 { (strip.p * next + self.twice) / slope } else { f64::INFINITY }
+            let slope = strip.p - self.two_h * strip.r;
+            if slope > 0.0 { (strip.p * next + self.two_h) / slope } else { f64::INFINITY }
         };
         self.strips.iter().map(most).fold(self.top, f64::min)
     }
 
     /// The largest b at the end, at most `top`, that can be reached from b at the start.
-    pub(super) fn fastest(&self, b: f64, top: f64) -> f64 {
+    pub(super) fn largest_end(&self, b: f64, top: f64) -> f64 {
         let highest =
             |strip: &Strip| if strip.p > 0.0 { (1.0 - strip.r * b) / strip.p } else { f64::INFINITY };
         let u = self.strips.iter().map(highest).fold(f64::INFINITY, f64::min);
-        (b + self.twice * u).clamp(0.0, top)
+        (b + self.two_h * u).clamp(0.0, top)
     }
 
     /// By how much the motors stay below their limits over the interval with an even acceleration, as a share of them; 0 if
@@ -125,18 +125,18 @@ impl IntervalConstraints {
 
     /// Whether a motor that is used is_near on the speed rather than on the acceleration: near a place where its m' vanishes
     /// (a zero-inertia point) a larger b at the start of a interval allows only a smaller one at its end, so going as fast
-    /// as possible up to there is not the fastest way. With `b1 = b + twice (1 - r b) / p` that begins at `twice r = p`;
+    /// as possible up to there is not the fastest way. With `b1 = b + two_h (1 - r b) / p` that begins at `two_h r = p`;
     /// the shorter the intervals, the narrower that region.
     pub(super) fn is_near_zero_inertia_point(&self, b0: f64, b1: f64) -> bool {
-        let u = (b1 - b0) / self.twice;
+        let u = (b1 - b0) / self.two_h;
         self.strips[..6].iter().any(|strip| {
-            self.twice * strip.r.abs() > 0.5 * strip.p && (strip.p * u + strip.r * b0).abs() > 0.5
+            self.two_h * strip.r.abs() > 0.5 * strip.p && (strip.p * u + strip.r * b0).abs() > 0.5
         })
     }
 
     /// Of some strips the one that is used most from b0 to b1, and by how much of its width.
     fn active_constraint(&self, b0: f64, b1: f64, strips: &[usize]) -> (usize, f64) {
-        let u = (b1 - b0) / self.twice;
+        let u = (b1 - b0) / self.two_h;
         let uses = strips.iter().map(|&index| {
             let strip = &self.strips[index];
             (index, (strip.p * u + strip.r * b0).abs())
@@ -150,11 +150,11 @@ impl IntervalConstraints {
 
     /// The time over the interval from b0 to b1, s; infinite from rest to rest where it cannot have a peak.
     pub(super) fn time(&self, b0: f64, b1: f64) -> f64 {
-        let length = 0.5 * self.twice;
+        let length = 0.5 * self.two_h;
         let over = |length: f64, a: f64, b: f64| 2.0 * length / (a.sqrt() + b.sqrt());
-        match self.run(b0, b1) {
-            Run::Even => over(length, b0, b1),
-            Run::Peak { b, up, down } => {
+        match self.speed_shape(b0, b1) {
+            SpeedShape::Ramp => over(length, b0, b1),
+            SpeedShape::Peak { b, up, down } => {
                 over(up, b0, b) + (length - up - down) / b.sqrt() + over(down, b, b1)
             }
         }
@@ -169,13 +169,13 @@ impl IntervalConstraints {
                 let duration = 2.0 * length / (slow + fast);
                 let acceleration = (fast - slow) / duration;
                 profile.push(Phase::even(interval.piece, start, slow, acceleration, duration));
-                self.limit(from, to, duration, &mut profile.limiting);
+                self.record_active_constraint(from, to, duration, &mut profile.limiting);
             }
             start += length;
         };
-        match self.run(b0, b1) {
-            Run::Even => push(interval.length, b0, b1),
-            Run::Peak { b, up, down } => {
+        match self.speed_shape(b0, b1) {
+            SpeedShape::Ramp => push(interval.length, b0, b1),
+            SpeedShape::Peak { b, up, down } => {
                 push(up, b0, b);
                 push(interval.length - up - down, b, b);
                 push(down, b, b1);
@@ -185,38 +185,38 @@ impl IntervalConstraints {
 
     /// An even ramp; or up to a peak and down again where the motors move in proportion to the parameter, so that one
     /// acceleration holds over all of the interval, and where it begins and ends at rest.
-    fn run(&self, b0: f64, b1: f64) -> Run {
+    fn speed_shape(&self, b0: f64, b1: f64) -> SpeedShape {
         if !self.is_straight() && b0 + b1 > 0.0 {
-            return Run::Even;
+            return SpeedShape::Ramp;
         }
-        // Up to `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f twice |r|:
-        // u = (1 - |r| b) / (p + twice |r|), and (2 b - b0 - b1) / 2 = u length.
+        // Up to `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f two_h |r|:
+        // u = (1 - |r| b) / (p + two_h |r|), and (2 b - b0 - b1) / 2 = u length.
         let mut b = self.cap;
         for Strip { p, r } in self.strips {
-            let (m1, m2) = (p + self.twice * r.abs(), r.abs());
-            b = b.min((self.twice + m1 * (b0 + b1)) / (2.0 * m1 + self.twice * m2));
+            let (m1, m2) = (p + self.two_h * r.abs(), r.abs());
+            b = b.min((self.two_h + m1 * (b0 + b1)) / (2.0 * m1 + self.two_h * m2));
         }
         let strongest =
-            self.strips.iter().map(|Strip { p, r }| (1.0 - r.abs() * b) / (p + self.twice * r.abs()));
+            self.strips.iter().map(|Strip { p, r }| (1.0 - r.abs() * b) / (p + self.two_h * r.abs()));
         let u = strongest.fold(f64::INFINITY, f64::min);
-        let length = 0.5 * self.twice;
+        let length = 0.5 * self.two_h;
         let (up, down) = ((b - b0) / (2.0 * u), (b - b1) / (2.0 * u));
         if b > b0.max(b1) && u > 0.0 && up + down <= length * (1.0 + 1e-9) {
             let up = up.min(length);
-            Run::Peak { b, up, down: down.min(length - up) }
+            SpeedShape::Peak { b, up, down: down.min(length - up) }
         } else {
-            Run::Even
+            SpeedShape::Ramp
         }
     }
 
     /// Books the time of a ramp to what is nearest to its limit.
-    fn limit(&self, b0: f64, b1: f64, duration: f64, limiting: &mut Limiting) {
+    fn record_active_constraint(&self, b0: f64, b1: f64, duration: f64, limiting: &mut Limiting) {
         let (strip, most) = self.active_constraint(b0, b1, &[0, 1, 2, 3, 4, 5, 6, 7]);
         if b0.max(b1) / self.cap >= most {
             match self.capped_by {
-                Cap::Pen => limiting.pen += duration,
-                Cap::Rows => limiting.rows += duration,
-                Cap::Motor(k) => limiting.speed[k] += duration,
+                SpeedLimit::Pen => limiting.pen += duration,
+                SpeedLimit::Rows => limiting.rows += duration,
+                SpeedLimit::Motor(k) => limiting.speed[k] += duration,
             }
         } else if strip >= 6 {
             limiting.rows += duration;
@@ -224,8 +224,8 @@ impl IntervalConstraints {
             // m' u + m'' b = (P - 2 f length R) u + R b, by the share f at which the strip was taken.
             let (k, share) = (strip / 3, 0.5 * (strip % 3) as f64);
             let Strip { p, r } = self.strips[strip];
-            let u = (b1 - b0) / self.twice;
-            let along = (p - share * self.twice * r) * u;
+            let u = (b1 - b0) / self.two_h;
+            let along = (p - share * self.two_h * r) * u;
             let turning = r * (b0 + share * (b1 - b0));
             let of =
                 if turning.abs() > along.abs() { &mut limiting.turning } else { &mut limiting.acceleration };
@@ -235,7 +235,7 @@ impl IntervalConstraints {
 }
 
 /// The largest b for which the strips have a common u that leads to no b below 0.
-fn highest(strips: &[Strip], twice: f64) -> f64 {
+fn largest_feasible(strips: &[Strip], two_h: f64) -> f64 {
     // Of every pair of a lower and an upper bound of u: lower(b) <= upper(b).
     let mut least = 0.0_f64;
     for (i, one) in strips.iter().enumerate() {
@@ -247,8 +247,8 @@ fn highest(strips: &[Strip], twice: f64) -> f64 {
         if one.p == 0.0 {
             least = least.max(one.r.abs());
         }
-        // -b / twice <= (1 - r b) / p: the end is not below rest.
-        least = least.max(one.r - one.p / twice);
+        // -b / two_h <= (1 - r b) / p: the end is not below rest.
+        least = least.max(one.r - one.p / two_h);
     }
     1.0 / least
 }
