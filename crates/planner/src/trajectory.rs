@@ -416,7 +416,7 @@ impl Cursor {
             self.phase += 1;
         }
         let phase = &profile.phases[self.phase];
-        let s = phase.way((time - self.phase_start).max(0.0));
+        let s = phase.position_at((time - self.phase_start).max(0.0));
         // Between rows no joint turns by half a turn, so the last row's pose says which turn this one is in.
         geometry.pose(machine, phase.piece, s, near)
     }

@@ -134,14 +134,14 @@ pub(super) fn run(python: &str) -> Result<bool> {
             at_most: false,
         },
         Goal {
-            what: "growth of planning, 1 to 10 times",
+            what: "acceleration_slope of planning, 1 to 10 times",
             unit: "exponent",
             figure: (tenfold_planning / planning).log10(),
             wanted: 1.05,
             at_most: true,
         },
         Goal {
-            what: "growth of emission with rows, to 10 times",
+            what: "acceleration_slope of emission with rows, to 10 times",
             unit: "exponent",
             figure: (trajectory.row_count() as f64 / emission / tenth_emission).ln()
                 / (trajectory.row_count() as f64 / tenth_plan.row_count() as f64).ln(),

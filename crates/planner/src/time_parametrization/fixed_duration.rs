@@ -26,8 +26,8 @@ pub fn fixed_duration(easing: Easing, length: f64, time: f64) -> Profile {
         Easing::SineOut => {
             // s'' = -omega² s with omega = pi / (2 T).
             let omega = FRAC_PI_2 / time;
-            let growth = -omega * omega;
-            profile.push(Phase { growth, ..Phase::even(0, 0.0, length * omega, 0.0, time) });
+            let acceleration_slope = -omega * omega;
+            profile.push(Phase { acceleration_slope, ..Phase::even(0, 0.0, length * omega, 0.0, time) });
         }
         Easing::QuadraticInOut => {
             let acceleration = 4.0 * mean / time;
@@ -47,7 +47,7 @@ mod tests {
         let mut since = t;
         for phase in &profile.phases {
             if since <= phase.duration {
-                return phase.way(since);
+                return phase.position_at(since);
             }
             since -= phase.duration;
         }

@@ -364,12 +364,12 @@ struct SquaredSpeeds<'a> {
 impl SquaredSpeeds<'_> {
     fn square(&mut self, piece: usize, s: f64) -> f64 {
         let before =
-            |phase: &Phase| phase.piece < piece || (phase.piece == piece && phase.way(phase.duration) < s);
+            |phase: &Phase| phase.piece < piece || (phase.piece == piece && phase.position_at(phase.duration) < s);
         while self.at + 1 < self.phases.len() && before(&self.phases[self.at]) {
             self.at += 1;
         }
         let phase = &self.phases[self.at];
-        let way = (s - phase.start).clamp(0.0, phase.way(phase.duration) - phase.start);
+        let way = (s - phase.start).clamp(0.0, phase.position_at(phase.duration) - phase.start);
         let way = if phase.piece > piece { 0.0 } else { way };
         (phase.speed * phase.speed + 2.0 * phase.acceleration * way).max(0.0)
     }
@@ -548,7 +548,7 @@ fn build_profile(
         let w = (to[1] - from[1]) / h;
         let phase =
             Phase::even(interval.piece, interval.start, from[0].sqrt(), 0.5 * from[1], duration(h, from, to, w));
-        profile.push(Phase { growth: 0.5 * w, ..phase });
+        profile.push(Phase { acceleration_slope: 0.5 * w, ..phase });
         // b is largest at an end, or where c is 0.
         let top = if from[1] > 0.0 && to[1] < 0.0 { from[0] - 0.5 * from[1] * from[1] / w } else { 0.0 };
         let speed = from[0].max(to[0]).max(top) / interval.cap;

@@ -14,7 +14,7 @@ use crate::joint_path::JointPath;
 /// A stretch on which the acceleration is even, or changes evenly by time or by the way.
 ///
 /// With `t` from its beginning: `s = start + speed S + acceleration C + jerk t³ / 6`, where `S = t` and `C = t²/2` unless the
-/// acceleration grows with the way, `d²s/dt² = acceleration + growth (s - start)`: then with k² = growth
+/// acceleration grows with the way, `d²s/dt² = acceleration + acceleration_slope (s - start)`: then with k² = acceleration_slope
 /// `S = sinh(k t) / k` and `C = (cosh(k t) - 1) / k²` (with sin and cos where it is negative). There is no phase with both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
@@ -27,7 +27,7 @@ pub struct Phase {
     /// Acceleration at its start, units/s².
     pub acceleration: f64,
     /// How the acceleration grows along the way, 1/s².
-    pub growth: f64,
+    pub acceleration_slope: f64,
     /// How the acceleration grows in time, units/s³.
     pub jerk: f64,
     /// How long it takes, s; positive.
@@ -37,15 +37,15 @@ pub struct Phase {
 impl Phase {
     /// With an even acceleration.
     fn even(piece: usize, start: f64, speed: f64, acceleration: f64, duration: f64) -> Self {
-        Self { piece, start, speed, acceleration, growth: 0.0, jerk: 0.0, duration }
+        Self { piece, start, speed, acceleration, acceleration_slope: 0.0, jerk: 0.0, duration }
     }
 
     /// Where it is on the piece, `t` s after it began.
-    pub fn way(&self, t: f64) -> f64 {
-        if self.growth == 0.0 {
+    pub fn position_at(&self, t: f64) -> f64 {
+        if self.acceleration_slope == 0.0 {
             return self.start + t * (self.speed + t * (0.5 * self.acceleration + t * self.jerk / 6.0));
         }
-        let square = self.growth * t * t;
+        let square = self.acceleration_slope * t * t;
         let (first, second) = if square.abs() < 1e-4 {
             // Series: what is left out is below 1e-12 of it.
             (
@@ -53,11 +53,11 @@ impl Phase {
                 0.5 * t * t * (1.0 + square / 12.0 * (1.0 + square / 30.0)),
             )
         } else {
-            let k = self.growth.abs().sqrt();
-            if self.growth > 0.0 {
-                (libm::sinh(k * t) / k, (libm::cosh(k * t) - 1.0) / self.growth)
+            let k = self.acceleration_slope.abs().sqrt();
+            if self.acceleration_slope > 0.0 {
+                (libm::sinh(k * t) / k, (libm::cosh(k * t) - 1.0) / self.acceleration_slope)
             } else {
-                (libm::sin(k * t) / k, (libm::cos(k * t) - 1.0) / self.growth)
+                (libm::sin(k * t) / k, (libm::cos(k * t) - 1.0) / self.acceleration_slope)
             }
         };
         self.start + self.speed * first + self.acceleration * second
@@ -114,7 +114,7 @@ impl Profile {
         for phase in &mut self.phases {
             phase.speed *= slower;
             phase.acceleration *= slower * slower;
-            phase.growth *= slower * slower;
+            phase.acceleration_slope *= slower * slower;
             phase.jerk *= slower * slower * slower;
             phase.duration *= times;
         }

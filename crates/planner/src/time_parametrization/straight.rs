@@ -41,7 +41,7 @@ pub(super) fn profile(machine: &Machine, change: MotorPos, fastest: f64) -> Prof
         if time > 0.0 {
             let phase = Phase { jerk, ..Phase::even(0, s, speed, acceleration, time) };
             profile.push(phase);
-            s = phase.way(time);
+            s = phase.position_at(time);
             speed += time * (acceleration + 0.5 * jerk * time);
             acceleration += jerk * time;
         }
