@@ -27,6 +27,6 @@ mod travel;
 pub use error::PlanError;
 pub use joint_path::JointPath;
 pub use settings::{Law, Settings};
-pub use time_parametrization::{Easing, Limiting};
+pub use time_parametrization::{Easing, LimitingConstraints};
 pub use trajectory::{ExactRow, Times, Trajectory, check_reach, plan};
 pub use travel::{travel_pose, travel_time};

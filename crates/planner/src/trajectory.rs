@@ -17,7 +17,7 @@ use crate::{
     joint_path::PathGeometry,
     settings::{self, Shares},
     stroke::{Drawn, Move, StrokePlanner, whole_periods},
-    time_parametrization::Limiting,
+    time_parametrization::LimitingConstraints,
 };
 
 /// How much geometry is planned at once, in curves of the drawing.
@@ -62,7 +62,7 @@ pub struct Trajectory<'a> {
     periods: u64,
     rows: u64,
     times: Times,
-    limiting: Limiting,
+    limiting: LimitingConstraints,
 }
 
 /// How the time of a plan is spent, s.
@@ -108,10 +108,10 @@ pub fn plan<'a>(
         periods: 0,
         rows: 1,
         times: Times::default(),
-        limiting: Limiting::default(),
+        limiting: LimitingConstraints::default(),
     };
     let period = settings.period_us as f64 * 1e-6;
-    let (mut periods, mut rows, mut times, mut limiting) = (0, 1, Times::default(), Limiting::default());
+    let (mut periods, mut rows, mut times, mut limiting) = (0, 1, Times::default(), LimitingConstraints::default());
     let (mut kept, mut phases) = (Some(Vec::new()), 0);
     let mut legs = trajectory.legs();
     while let Some(leg) = legs.next_leg()? {
@@ -168,7 +168,7 @@ impl Trajectory<'_> {
     }
 
     /// For how long of the drawing time each limit was what kept it from being shorter, s.
-    pub fn limiting(&self) -> Limiting {
+    pub fn limiting(&self) -> LimitingConstraints {
         self.limiting
     }
 

@@ -15,7 +15,7 @@
 
 use kinematics::Machine;
 
-use super::{Limiting, Phase, Profile, SpeedCap};
+use super::{LimitingConstraints, Phase, Profile, SpeedCap};
 use crate::joint_path::GridInterval;
 
 /// The condition `|p u + r b| <= 1`, p >= 0, with b at the interval's start.
@@ -210,16 +210,16 @@ impl IntervalConstraints {
     }
 
     /// Books the time of a ramp to what is nearest to its limit.
-    fn record_active_constraint(&self, b0: f64, b1: f64, duration: f64, limiting: &mut Limiting) {
+    fn record_active_constraint(&self, b0: f64, b1: f64, duration: f64, limiting: &mut LimitingConstraints) {
         let (strip, most) = self.active_constraint(b0, b1, &[0, 1, 2, 3, 4, 5, 6, 7]);
         if b0.max(b1) / self.cap >= most {
             match self.capped_by {
-                SpeedLimit::Pen => limiting.pen += duration,
-                SpeedLimit::Rows => limiting.rows += duration,
-                SpeedLimit::Motor(k) => limiting.speed[k] += duration,
+                SpeedLimit::Pen => limiting.pen_s += duration,
+                SpeedLimit::Rows => limiting.rows_s += duration,
+                SpeedLimit::Motor(k) => limiting.speed_s[k] += duration,
             }
         } else if strip >= 6 {
-            limiting.rows += duration;
+            limiting.rows_s += duration;
         } else {
             // m' u + m'' b = (P - 2 f length R) u + R b, by the share f at which the strip was taken.
             let (k, share) = (strip / 3, 0.5 * (strip % 3) as f64);
@@ -228,7 +228,7 @@ impl IntervalConstraints {
             let along = (p - share * self.two_h * r) * u;
             let turning = r * (b0 + share * (b1 - b0));
             let of =
-                if turning.abs() > along.abs() { &mut limiting.turning } else { &mut limiting.acceleration };
+                if turning.abs() > along.abs() { &mut limiting.turning_s } else { &mut limiting.acceleration_s };
             of[k] += duration;
         }
     }

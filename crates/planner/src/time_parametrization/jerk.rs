@@ -540,7 +540,7 @@ fn build_profile(
             let (speed, acceleration) = if k == 0 { (0.0, 0.0) } else { (b.sqrt(), -jerk * duration) };
             let phase = Phase::even(interval.piece, interval.start, speed, acceleration, duration);
             profile.push(Phase { jerk, ..phase });
-            profile.limiting.jerk
+            profile.limiting.jerk_s
                 [usize::from(interval.points[1].jerk[1][0].abs() > interval.points[1].jerk[0][0].abs())] += duration;
             excesses.push((1.0, 1.0));
             continue;
@@ -592,21 +592,21 @@ fn record_active_constraint(interval: &JerkInterval, from: State, to: State, exc
     if speed >= excess.0.max(excess.1) {
         let fastest = [0, 1].map(|k| point.speed[k] * point.speed[k] * interval.cap);
         if fastest[0].max(fastest[1]) > 0.999 {
-            limiting.speed[usize::from(fastest[1] > fastest[0])] += duration;
+            limiting.speed_s[usize::from(fastest[1] > fastest[0])] += duration;
         } else if point.second_derivative_bound * interval.cap > 0.999 * interval.row_limit {
-            limiting.rows += duration;
+            limiting.rows_s += duration;
         } else {
-            limiting.pen += duration;
+            limiting.pen_s += duration;
         }
     } else if excess.1 >= excess.0 {
         let of = |[m1, m2, m3]: [f64; 3]| (0.5 * m1 * w + 1.5 * m2 * c + m3 * b).abs();
-        limiting.jerk[usize::from(of(point.jerk[1]) > of(point.jerk[0]))] += duration;
+        limiting.jerk_s[usize::from(of(point.jerk[1]) > of(point.jerk[0]))] += duration;
     } else {
         let of = |[m1, m2]: [f64; 2]| (0.5 * m1 * c + m2 * b).abs();
         let k = usize::from(of(point.acceleration[1]) > of(point.acceleration[0]));
         let [m1, m2] = point.acceleration[k];
         let turning = (m2 * b).abs() > (0.5 * m1 * c).abs();
-        *(if turning { &mut limiting.turning[k] } else { &mut limiting.acceleration[k] }) += duration;
+        *(if turning { &mut limiting.turning_s[k] } else { &mut limiting.acceleration_s[k] }) += duration;
     }
 }
 

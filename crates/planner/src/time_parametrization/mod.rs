@@ -72,7 +72,7 @@ pub struct Profile {
     /// How long all of them take, s.
     pub duration: f64,
     /// What it is that does not let it be faster.
-    pub limiting: Limiting,
+    pub limiting: LimitingConstraints,
 }
 
 /// What limits the speed beside the motors.
@@ -88,7 +88,7 @@ pub struct SpeedCap {
 
 /// For how long each limit was what kept a motion from being faster, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Limiting {
+pub struct LimitingConstraints {
     /// Each motor's speed.
     pub speed: [f64; 2],
     /// Each motor's acceleration, while it mostly speeds up or slows down along the way.
@@ -105,7 +105,7 @@ pub struct Limiting {
 
 impl Profile {
     fn new() -> Self {
-        Self { phases: Vec::new(), duration: 0.0, limiting: Limiting::default() }
+        Self { phases: Vec::new(), duration: 0.0, limiting: LimitingConstraints::default() }
     }
 
     /// The same motion in so many times the time.
@@ -130,7 +130,7 @@ impl Profile {
     }
 }
 
-impl Limiting {
+impl LimitingConstraints {
     /// All of it together, s.
     pub fn total(&self) -> f64 {
         let of = |pair: [f64; 2]| pair[0] + pair[1];
@@ -140,10 +140,10 @@ impl Limiting {
     /// Adds what limited another motion, `scale` times as long.
     pub fn add(&mut self, other: &Self, scale: f64) {
         for k in 0..2 {
-            self.speed[k] += scale * other.speed[k];
-            self.acceleration[k] += scale * other.acceleration[k];
-            self.turning[k] += scale * other.turning[k];
-            self.jerk[k] += scale * other.jerk[k];
+            self.speed_s[k] += scale * other.speed_s[k];
+            self.acceleration_s[k] += scale * other.acceleration_s[k];
+            self.turning_s[k] += scale * other.turning_s[k];
+            self.jerk_s[k] += scale * other.jerk_s[k];
         }
         self.pen += scale * other.pen;
         self.rows += scale * other.rows;
