@@ -1,17 +1,17 @@
 //! Convex sets in the plane, by their corners.
 
 /// A point of the plane.
-pub(super) type Place = [f64; 2];
+pub(super) type Vertex = [f64; 2];
 
 /// Corners of a polygon at most; beyond that those go that cost least.
 const CORNERS: usize = 24;
 
 /// A convex polygon, its corners counterclockwise; without any it is empty.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Polygon(pub(super) Vec<Place>);
+pub(super) struct Polygon(pub(super) Vec<Vertex>);
 
 impl Polygon {
-    /// Its edges as conditions `x p + y q <= room` on a point (p, q) inside.
+    /// Its edges as conditions `x p + y q <= offset` on a point (p, q) inside.
     pub(super) fn edges(&self) -> impl Iterator<Item = [f64; 3]> {
         let edges = self.0.iter().zip(self.0.iter().cycle().skip(1));
         edges.map(|(p, q)| {
@@ -21,10 +21,10 @@ impl Polygon {
         })
     }
 
-    /// Keeps what fulfils `x p + y q <= room`.
-    pub(super) fn clip(&mut self, x: f64, y: f64, room: f64) {
-        let off = |p: &Place| x * p[0] + y * p[1] - room;
-        let scale = self.0.iter().map(|p| (x * p[0]).abs() + (y * p[1]).abs()).fold(room.abs(), f64::max);
+    /// Keeps what fulfils `x p + y q <= offset`.
+    pub(super) fn clip(&mut self, x: f64, y: f64, offset: f64) {
+        let off = |p: &Vertex| x * p[0] + y * p[1] - offset;
+        let scale = self.0.iter().map(|p| (x * p[0]).abs() + (y * p[1]).abs()).fold(offset.abs(), f64::max);
         let slack = 1e-13 * scale;
         if self.0.iter().all(|p| off(p) <= slack) {
             return;
@@ -42,9 +42,9 @@ impl Polygon {
         }
     }
 
-    /// Drops those bounds `room - x p - y q` that on this set are nowhere below some other one.
+    /// Drops those bounds `offset - x p - y q` that on this set are nowhere below some other one.
     pub(super) fn keep_tight(&self, bounds: &mut Vec<[f64; 3]>) {
-        let at = |[x, y, room]: &[f64; 3], p: &Place| room - x * p[0] - y * p[1];
+        let at = |[x, y, offset]: &[f64; 3], p: &Vertex| offset - x * p[0] - y * p[1];
         let mut kept: Vec<[f64; 3]> = Vec::with_capacity(bounds.len());
         for bound in bounds.iter() {
             let above = |one: &[f64; 3], other: &[f64; 3]| self.0.iter().all(|p| at(one, p) >= at(other, p));
@@ -93,8 +93,8 @@ mod tests {
 
     use super::*;
 
-    fn inside(set: &Polygon, [p, q]: Place) -> bool {
-        !set.0.is_empty() && set.edges().all(|[x, y, room]| x * p + y * q <= room)
+    fn inside(set: &Polygon, [p, q]: Vertex) -> bool {
+        !set.0.is_empty() && set.edges().all(|[x, y, offset]| x * p + y * q <= offset)
     }
 
     proptest! {
@@ -105,14 +105,14 @@ mod tests {
             points in proptest::collection::vec((-1.0..1.0f64, -1.0..1.0f64), 20),
         ) {
             let mut set = Polygon(vec![[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]);
-            for (x, y, room) in &conditions {
-                set.clip(*x, *y, *room);
+            for (x, y, offset) in &conditions {
+                set.clip(*x, *y, *offset);
             }
             let whole = set.clone();
             set.simplify();
             prop_assert!(set.0.len() <= CORNERS);
             for (p, q) in points {
-                let fulfils = |slack: f64| conditions.iter().all(|(x, y, room)| x * p + y * q <= room + slack);
+                let fulfils = |slack: f64| conditions.iter().all(|(x, y, offset)| x * p + y * q <= offset + slack);
                 prop_assert!(!inside(&whole, [p, q]) || fulfils(1e-9));
                 prop_assert!(inside(&whole, [p, q]) || !fulfils(-1e-6));
                 prop_assert!(!inside(&set, [p, q]) || fulfils(1e-9));
