@@ -169,14 +169,14 @@ impl JerkInterval {
         self.allowed = (stricter(self.allowed.0, excess.0), stricter(self.allowed.1, excess.1));
     }
 
-    /// All conditions on (b, c) at its start and w: `x b + y c + z w <= room`.
+    /// All conditions on (b, c) at its start and w: `x b + y c + z w <= offset`.
     fn conditions(&self) -> Vec<[f64; 4]> {
         let mut all = Vec::with_capacity(40);
         for (j, share) in FRACTIONS.into_iter().enumerate() {
             let (point, s) = (&self.points[j], share * self.length);
             // b there is b + s c + s²/2 w, c there is c + s w.
-            let mut hold = |of_b: f64, of_c: f64, of_w: f64, room: f64| {
-                all.push([of_b, of_b * s + of_c, 0.5 * of_b * s * s + of_c * s + of_w, room]);
+            let mut hold = |of_b: f64, of_c: f64, of_w: f64, offset: f64| {
+                all.push([of_b, of_b * s + of_c, 0.5 * of_b * s * s + of_c * s + of_w, offset]);
             };
             hold(1.0, 0.0, 0.0, self.cap);
             hold(-1.0, 0.0, 0.0, 0.0);
@@ -187,8 +187,8 @@ impl JerkInterval {
                     hold(m2, 0.5 * m1, 0.0, self.allowed.0);
                     if point.jerk[k] != [0.0; 3] {
                         let [m1, m2, m3] = point.jerk[k].map(|m| sign * m);
-                        let (room, slope) = (self.allowed.1 * tangent.0, self.allowed.1 * tangent.1);
-                        hold(m3 - slope, 1.5 * m2, 0.5 * m1, room);
+                        let (offset, slope) = (self.allowed.1 * tangent.0, self.allowed.1 * tangent.1);
+                        hold(m3 - slope, 1.5 * m2, 0.5 * m1, offset);
                     }
                 }
             }
@@ -436,8 +436,8 @@ impl TerminalInterval {
 
     fn set(&self, interval: &JerkInterval, bound_share: f64, most: f64) -> Polygon {
         let mut set = initial_set(interval, bound_share);
-        for [x, y, z, room] in interval.conditions() {
-            set.clip(x + z * self.w[0], y + z * self.w[1], room);
+        for [x, y, z, offset] in interval.conditions() {
+            set.clip(x + z * self.w[0], y + z * self.w[1], offset);
         }
         set.clip(self.end[0], self.end[1], most);
         set.clip(-self.end[0], -self.end[1], 0.0);
@@ -473,21 +473,21 @@ fn initial_set(interval: &JerkInterval, bound_share: f64) -> Polygon {
 fn controllable_set(interval: &JerkInterval, bound_share: f64, next: &Polygon) -> Polygon {
     let mut set = initial_set(interval, bound_share);
     let (mut upper, mut lower) = (Vec::with_capacity(40), Vec::with_capacity(40));
-    for [x, y, z, room] in interval.conditions().into_iter().chain(propagate(interval, next)) {
+    for [x, y, z, offset] in interval.conditions().into_iter().chain(propagate(interval, next)) {
         if z > 0.0 {
-            upper.push([x / z, y / z, room / z]);
+            upper.push([x / z, y / z, offset / z]);
         } else if z < 0.0 {
-            lower.push([x / -z, y / -z, room / -z]);
+            lower.push([x / -z, y / -z, offset / -z]);
         } else {
-            set.clip(x, y, room);
+            set.clip(x, y, offset);
         }
     }
     set.keep_tight(&mut upper);
     set.keep_tight(&mut lower);
-    // w <= room - x b - y c for the upper ones, w >= x b + y c - room for the lower.
-    for [x, y, room] in &upper {
+    // w <= offset - x b - y c for the upper ones, w >= x b + y c - offset for the lower.
+    for [x, y, offset] in &upper {
         for [x1, y1, room1] in &lower {
-            set.clip(x + x1, y + y1, room + room1);
+            set.clip(x + x1, y + y1, offset + room1);
         }
     }
     set.simplify();
@@ -498,14 +498,14 @@ fn controllable_set(interval: &JerkInterval, bound_share: f64, next: &Polygon) -
 fn propagate(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f64; 4]> {
     let h = interval.length;
     // b at the end is b + h c + h²/2 w, c there is c + h w.
-    set.edges().map(move |[x, y, room]| [x, x * h + y, 0.5 * x * h * h + y * h, room])
+    set.edges().map(move |[x, y, offset]| [x, x * h + y, 0.5 * x * h * h + y * h, offset])
 }
 
 /// The largest w by which a interval leads from a state into a set; nothing if there is none at all.
 fn largest_w_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    for [x, y, z, room] in interval.conditions().into_iter().chain(propagate(interval, set)) {
-        let left = room - x * b - y * c;
+    for [x, y, z, offset] in interval.conditions().into_iter().chain(propagate(interval, set)) {
+        let left = offset - x * b - y * c;
         if z > 0.0 {
             high = high.min(left / z);
         } else if z < 0.0 {
