@@ -23,7 +23,7 @@
 //! nearest to P    d = 13 h |v - u| / 48,   |p''| <= |v - u| / (2 h),   |p'''| = |v - u| / (2 h²)      by a parameter of |p'| = 1
 //! ```
 //! Its legs are 1.4 times those of the parabola that misses the vertex by as much. Also where a line runs smoothly into an arc
-//! the curvature jumps; such joints become splines too.
+//! the curvature jumps; such junctions become splines too.
 
 use drawing::{CubicBez, Point, Segment, Vec2};
 
@@ -47,9 +47,9 @@ pub enum Corner {
     Spline,
 }
 
-/// The joint after each piece but the last.
+/// The junction after each piece but the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Joint {
+enum Junction {
     /// The tangent goes on.
     Smooth,
     /// The pen rests.
@@ -64,21 +64,21 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: Corner) -> Ve
     if pieces.is_empty() {
         return Vec::new();
     }
-    let joints = joints(pieces, deviation, corner);
+    let junctions = junctions(pieces, deviation, corner);
     let mut sections = Vec::new();
     let mut section = Vec::new();
     // How much of the piece at hand its first blend has taken, mm.
     let mut taken = 0.0;
     for (index, piece) in pieces.iter().enumerate() {
-        let joint = joints.get(index).copied().unwrap_or(Joint::Stop);
-        let gives = if let Joint::Blend(leg) = joint { leg } else { 0.0 };
+        let junction = junctions.get(index).copied().unwrap_or(Junction::Stop);
+        let gives = if let Junction::Blend(leg) = junction { leg } else { 0.0 };
         let rest = trimmed(piece, taken, gives);
         taken = 0.0;
         section.extend(rest);
-        match joint {
-            Joint::Smooth => {}
-            Joint::Stop => sections.push(std::mem::take(&mut section)),
-            Joint::Blend(leg) => {
+        match junction {
+            Junction::Smooth => {}
+            Junction::Stop => sections.push(std::mem::take(&mut section)),
+            Junction::Blend(leg) => {
                 section.extend(corner.curve(piece, &pieces[index + 1], leg).into_iter().flatten());
                 taken = leg;
             }
@@ -87,13 +87,13 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: Corner) -> Ve
     sections
 }
 
-/// Every joint, with legs such that neighbouring blends share the piece between them.
-fn joints(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Joint> {
-    let mut joints: Vec<Joint> =
-        pieces.windows(2).map(|pair| wanted(&pair[0], &pair[1], deviation, corner)).collect();
+/// Every junction, with legs such that neighbouring blends share the piece between them.
+fn junctions(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Junction> {
+    let mut junctions: Vec<Junction> =
+        pieces.windows(2).map(|pair| ideal_junction(&pair[0], &pair[1], deviation, corner)).collect();
     // The piece between two blends: whoever wants less than half of it leaves the rest to the other.
-    let leg = |joint: Option<&Joint>| match joint {
-        Some(Joint::Blend(leg)) => *leg,
+    let leg = |junction: Option<&Junction>| match junction {
+        Some(Junction::Blend(leg)) => *leg,
         _ => 0.0,
     };
     let shares: Vec<(f64, f64)> = pieces
@@ -102,31 +102,31 @@ fn joints(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Joint> {
         .map(|(index, piece)| {
             let length = available(piece);
             let (before, after) =
-                (leg(index.checked_sub(1).and_then(|k| joints.get(k))), leg(joints.get(index)));
+                (leg(index.checked_sub(1).and_then(|k| junctions.get(k))), leg(junctions.get(index)));
             (before.min((length / 2.0).max(length - after)), after.min((length / 2.0).max(length - before)))
         })
         .collect();
-    for (index, joint) in joints.iter_mut().enumerate() {
-        if let Joint::Blend(leg) = joint {
+    for (index, junction) in junctions.iter_mut().enumerate() {
+        if let Junction::Blend(leg) = junction {
             *leg = shares[index].1.min(shares[index + 1].0);
             if *leg < SHORTEST {
-                *joint = Joint::Stop;
+                *junction = Junction::Stop;
             }
         }
     }
-    joints
+    junctions
 }
 
-/// What a joint would be if it had both pieces to itself.
-fn wanted(before: &Segment, after: &Segment, deviation: f64, corner: Corner) -> Joint {
+/// What a junction would be if it had both pieces to itself.
+fn ideal_junction(before: &Segment, after: &Segment, deviation: f64, corner: Corner) -> Junction {
     let (Some(u), Some(v)) = (direction_at(before, 1.0), direction_at(after, 0.0)) else {
-        return Joint::Stop;
+        return Junction::Stop;
     };
     if is_smooth(u, v) && (corner == Corner::Parabola || is_as_curved(before, after)) {
-        return Joint::Smooth;
+        return Junction::Smooth;
     }
     if deviation <= 0.0 || u.dot(v) < TURNS_BACK {
-        return Joint::Stop;
+        return Junction::Stop;
     }
     let share = match corner {
         Corner::Parabola => 4.0,
@@ -134,7 +134,7 @@ fn wanted(before: &Segment, after: &Segment, deviation: f64, corner: Corner) -> 
     };
     let leg = share * deviation / (v - u).hypot2().sqrt();
     if matches!((before, after), (Segment::Line(_), Segment::Line(_))) {
-        return Joint::Blend(leg);
+        return Junction::Blend(leg);
     }
     // Between curves the closed form is only where to begin: shorten until what is measured holds.
     let mut leg = leg.min(available(before) / 2.0).min(available(after) / 2.0);
@@ -143,11 +143,11 @@ fn wanted(before: &Segment, after: &Segment, deviation: f64, corner: Corner) -> 
             .curve(before, after, leg)
             .is_some_and(|blend| strays(&blend, before, after, leg) <= deviation)
         {
-            return Joint::Blend(leg);
+            return Junction::Blend(leg);
         }
         leg *= 0.7;
     }
-    Joint::Stop
+    Junction::Stop
 }
 
 /// How much of a piece blends may take, mm: of a curve no more than turns by half a radian.
@@ -183,7 +183,7 @@ fn parameter(piece: &Segment, leg: f64, at_start: bool) -> f64 {
 }
 
 impl Corner {
-    /// The blend at the joint of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
+    /// The blend at the junction of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
     /// Nothing if there is none between.
     fn curve(self, before: &Segment, after: &Segment, leg: f64) -> Option<Vec<Segment>> {
         let (t0, t1) = (parameter(before, leg, false), parameter(after, leg, true));
@@ -243,13 +243,13 @@ fn curvature_at(piece: &Segment, t: f64) -> Vec2 {
     second / first.hypot2()
 }
 
-/// Whether the curvature goes on at a smooth joint.
+/// Whether the curvature goes on at a smooth junction.
 fn is_as_curved(before: &Segment, after: &Segment) -> bool {
     let (one, other) = (curvature_at(before, 1.0), curvature_at(after, 0.0));
     (one - other).hypot2().sqrt() <= SAME_CURVATURE * (one.hypot2().sqrt() + other.hypot2().sqrt())
 }
 
-/// How far a blend strays from the two pieces, or misses their joint, mm, by samples; a bound to a few per cent.
+/// How far a blend strays from the two pieces, or misses their junction, mm, by samples; a bound to a few per cent.
 fn strays(blend: &[Segment], before: &Segment, after: &Segment, leg: f64) -> f64 {
     const SAMPLES: u32 = 16;
     let along = |segment: &Segment, from: f64, to: f64| -> Vec<Point> {
