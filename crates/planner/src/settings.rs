@@ -5,7 +5,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use crate::{
     PlanError,
-    path::{Budget, Corner},
+    path::{Budget, CornerBlend},
     time_parametrization::Easing,
 };
 
@@ -110,7 +110,7 @@ impl Shares {
         let simplify = SIMPLIFY_SHARE * path;
         let marked = if needed > share { row } else { f64::INFINITY };
         let jerk = machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some());
-        let corner = if jerk { Corner::Spline } else { Corner::Parabola };
+        let corner = if jerk { CornerBlend::Spline } else { CornerBlend::Parabola };
         Self {
             row,
             path: Budget { chord: 0.5 * path, simplify, blend: path - simplify, corner, row: marked },

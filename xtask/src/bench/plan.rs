@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::joint_path::PathGeometry;
-use planner::path::{Budget, Corner, sections};
+use planner::path::{Budget, CornerBlend, sections};
 use planner::placement::{Size, Wish, place};
 use planner::time_parametrization::{Profile, SpeedCap, profile, rough_profile};
 use planner::{JointPath, Settings, Trajectory};
@@ -289,7 +289,7 @@ impl Stages {
             chord: 0.5 * TOLERANCE,
             simplify: 0.3 * TOLERANCE,
             blend: 0.7 * TOLERANCE,
-            corner: Corner::Parabola,
+            corner: CornerBlend::Parabola,
             row: f64::INFINITY,
         };
         let stroke = drawing.strokes.first().context("a workload without strokes")?;

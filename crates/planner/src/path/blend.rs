@@ -40,7 +40,7 @@ const SHORTEST: f64 = 1e-6;
 
 /// What becomes of a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Corner {
+pub enum CornerBlend {
     /// A parabola: the curvature jumps at its ends. The fastest where only acceleration is limited.
     Parabola,
     /// A spline of three cubics: the curvature is continuous.
@@ -60,7 +60,7 @@ enum Junction {
 
 /// Smooth runs of curves: corners blended within `deviation` mm, cut where the pen turns back (or at every corner if
 /// the deviation is 0).
-pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Vec<Segment>> {
+pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: CornerBlend) -> Vec<Vec<Segment>> {
     if pieces.is_empty() {
         return Vec::new();
     }
@@ -88,7 +88,7 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: Corner) -> Ve
 }
 
 /// Every junction, with legs such that neighbouring blends share the piece between them.
-fn junctions(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Junction> {
+fn junctions(pieces: &[Segment], deviation: f64, corner: CornerBlend) -> Vec<Junction> {
     let mut junctions: Vec<Junction> =
         pieces.windows(2).map(|pair| ideal_junction(&pair[0], &pair[1], deviation, corner)).collect();
     // The piece between two blends: whoever wants less than half of it leaves the rest to the other.
@@ -118,19 +118,19 @@ fn junctions(pieces: &[Segment], deviation: f64, corner: Corner) -> Vec<Junction
 }
 
 /// What a junction would be if it had both pieces to itself.
-fn ideal_junction(before: &Segment, after: &Segment, deviation: f64, corner: Corner) -> Junction {
+fn ideal_junction(before: &Segment, after: &Segment, deviation: f64, corner: CornerBlend) -> Junction {
     let (Some(u), Some(v)) = (direction_at(before, 1.0), direction_at(after, 0.0)) else {
         return Junction::Stop;
     };
-    if is_smooth(u, v) && (corner == Corner::Parabola || is_as_curved(before, after)) {
+    if is_smooth(u, v) && (corner == CornerBlend::Parabola || is_as_curved(before, after)) {
         return Junction::Smooth;
     }
     if deviation <= 0.0 || u.dot(v) < TURNS_BACK {
         return Junction::Stop;
     }
     let share = match corner {
-        Corner::Parabola => 4.0,
-        Corner::Spline => 72.0 / 13.0,
+        CornerBlend::Parabola => 4.0,
+        CornerBlend::Spline => 72.0 / 13.0,
     };
     let leg = share * deviation / (v - u).hypot2().sqrt();
     if matches!((before, after), (Segment::Line(_), Segment::Line(_))) {
@@ -182,7 +182,7 @@ fn parameter(piece: &Segment, leg: f64, at_start: bool) -> f64 {
     if at_start { share } else { 1.0 - share }
 }
 
-impl Corner {
+impl CornerBlend {
     /// The blend at the junction of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
     /// Nothing if there is none between.
     fn curve(self, before: &Segment, after: &Segment, leg: f64) -> Option<Vec<Segment>> {
@@ -287,7 +287,7 @@ mod tests {
         #[test]
         fn blends_stay_within_the_deviation_both_ways_and_are_smooth(
             turns in proptest::collection::vec((-3.0..3.0f64, 0.02..5.0f64), 2..12), deviation in 0.01..0.5f64,
-            corner in prop_oneof![Just(Corner::Parabola), Just(Corner::Spline)],
+            corner in prop_oneof![Just(CornerBlend::Parabola), Just(CornerBlend::Spline)],
         ) {
             let (mut at, mut angle) = (Point::ZERO, 0.0);
             let mut points = vec![at];
@@ -304,7 +304,7 @@ mod tests {
                     let (a, b) = (direction_at(&pair[0], 1.0).unwrap(), direction_at(&pair[1], 0.0).unwrap());
                     prop_assert!((pair[0].end() - pair[1].start()).hypot2() < 1e-10);
                     prop_assert!(a.dot(b) > 1.0 - 1e-9);
-                    if corner == Corner::Spline {
+                    if corner == CornerBlend::Spline {
                         let jump = curvature_at(&pair[0], 1.0) - curvature_at(&pair[1], 0.0);
                         prop_assert!(jump.hypot2().sqrt() < 1e-6, "curvature jumps by {:?}", jump);
                     }
@@ -327,7 +327,7 @@ mod tests {
         let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, -1.0, 2.0));
         let Segment::Arc(at) = arc else { unreachable!("it is an arc") };
         let to = Segment::Line(Line::new(line.end(), at.eval(0.0)));
-        let sections = sections(&[line, to, arc], 0.05, Corner::Parabola);
+        let sections = sections(&[line, to, arc], 0.05, CornerBlend::Parabola);
         assert_eq!(sections.len(), 1);
         for pair in sections[0].windows(2) {
             let (a, b) = (direction_at(&pair[0], 1.0).unwrap(), direction_at(&pair[1], 0.0).unwrap());
@@ -339,7 +339,7 @@ mod tests {
     fn a_right_angle_uses_all_of_its_deviation() {
         let corner = [Point::new(0.0, 0.0), Point::new(10.0, 0.0), Point::new(10.0, 10.0)];
         let lines: Vec<Segment> = corner.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
-        let sections = sections(&lines, 0.1, Corner::Parabola);
+        let sections = sections(&lines, 0.1, CornerBlend::Parabola);
         assert_eq!(sections.len(), 1);
         let nearest = sections[0][1].eval(0.5);
         assert!((distance(nearest, corner[1]) - 0.1).abs() < 1e-12);
@@ -349,7 +349,7 @@ mod tests {
     fn a_spline_uses_all_of_its_deviation_too() {
         let corner = [Point::new(0.0, 0.0), Point::new(10.0, 0.0), Point::new(10.0, 10.0)];
         let lines: Vec<Segment> = corner.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
-        let sections = sections(&lines, 0.1, Corner::Spline);
+        let sections = sections(&lines, 0.1, CornerBlend::Spline);
         assert_eq!((sections.len(), sections[0].len()), (1, 5));
         let nearest = sections[0][2].eval(0.5);
         assert!((distance(nearest, corner[1]) - 0.1).abs() < 1e-12);
@@ -360,8 +360,8 @@ mod tests {
         let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(10.0, 0.0)));
         let down = -std::f64::consts::FRAC_PI_2;
         let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, down, 2.0));
-        assert_eq!(sections(&[line, arc], 0.05, Corner::Parabola)[0].len(), 2);
-        let splined = sections(&[line, arc], 0.05, Corner::Spline);
+        assert_eq!(sections(&[line, arc], 0.05, CornerBlend::Parabola)[0].len(), 2);
+        let splined = sections(&[line, arc], 0.05, CornerBlend::Spline);
         assert_eq!((splined.len(), splined[0].len()), (1, 5));
         for pair in splined[0].windows(2) {
             let jump = curvature_at(&pair[0], 1.0) - curvature_at(&pair[1], 0.0);

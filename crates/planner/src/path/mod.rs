@@ -12,7 +12,7 @@ mod slow_zones;
 
 use drawing::{Line, Point, Segment, Stroke, Vec2};
 
-pub use blend::Corner;
+pub use blend::CornerBlend;
 
 /// Vertices that lie on the straight line between their neighbours, to this distance in mm, are not corners.
 const COLLINEAR: f64 = 1e-9;
@@ -34,7 +34,7 @@ pub struct Budget {
     /// Blends that stand for corners.
     pub blend: f64,
     /// What becomes of corners.
-    pub corner: Corner,
+    pub corner: CornerBlend,
     /// What linear motion between rows may take, where the motors are strong enough to exceed it: then pieces near turns
     /// are marked. Infinite where they are not.
     pub row: f64,
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     const EXACT: Budget =
-        Budget { chord: 0.01, simplify: 0.0, blend: 0.0, corner: Corner::Parabola, row: f64::INFINITY };
+        Budget { chord: 0.01, simplify: 0.0, blend: 0.0, corner: CornerBlend::Parabola, row: f64::INFINITY };
 
     fn polyline(points: &[(f64, f64)]) -> Stroke {
         let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
