@@ -6,7 +6,7 @@ use std::path::Path;
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::joint_path::{GridInterval, PathGeometry};
-use planner::path::{Budget, CornerBlend, Section, sections};
+use planner::path::{PathBudget, CornerBlend, Section, sections};
 use planner::time_parametrization::{SpeedCap, profile};
 use planner::{JointPath, Settings, plan};
 
@@ -108,7 +108,7 @@ fn corner() -> String {
     let stroke = polyline(&points);
     let deviation = 0.1;
     let budget =
-        Budget { chord: 0.01, simplify: 0.0, blend: deviation, corner: CornerBlend::Parabola, row: f64::INFINITY };
+        PathBudget { chord: 0.01, simplify: 0.0, blend: deviation, corner: CornerBlend::Parabola, row: f64::INFINITY };
     let mut picture = Picture::new(Rect::new(20.0, 20.0, 620.0, 340.0), Rect::new(-0.1, -0.2, 2.9, 1.4));
     // Everything within the tolerance, as one broad line with round joints.
     let broad = 2.0 * deviation * 200.0;
@@ -141,7 +141,7 @@ fn speed() -> Result<String, Failure> {
     let down = -std::f64::consts::FRAC_PI_2;
     stroke.arc(EllipticArc::circular(Point::new(62.0, 53.5), 2.5, down, std::f64::consts::PI));
     let budget =
-        Budget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Parabola, row: f64::INFINITY };
+        PathBudget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Parabola, row: f64::INFINITY };
     let cap = SpeedCap { pen: machine.pen().max_speed_mm_s, row_deviation: f64::INFINITY, period: 1e-3 };
     let (mut limit, mut driven) = (Vec::new(), Vec::new());
     let mut way = 0.0;

@@ -5,7 +5,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use crate::{
     PlanError,
-    path::{Budget, CornerBlend},
+    path::{PathBudget, CornerBlend},
     time_parametrization::Easing,
 };
 
@@ -78,7 +78,7 @@ pub(crate) struct Shares {
     /// To linear motion between rows.
     pub(crate) row: f64,
     /// To the path itself.
-    pub(crate) path: Budget,
+    pub(crate) path: PathBudget,
 }
 
 impl Shares {
@@ -113,7 +113,7 @@ impl Shares {
         let corner = if jerk { CornerBlend::Spline } else { CornerBlend::Parabola };
         Self {
             row,
-            path: Budget { chord: 0.5 * path, simplify, blend: path - simplify, corner, row: marked },
+            path: PathBudget { chord: 0.5 * path, simplify, blend: path - simplify, corner, row: marked },
         }
     }
 }

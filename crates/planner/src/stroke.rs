@@ -6,7 +6,7 @@ use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 use crate::{
     Settings,
     joint_path::{PathGeometry, JointPath},
-    path::{Budget, Section, sections, vertex_to_vertex},
+    path::{PathBudget, Section, sections, vertex_to_vertex},
     settings::{Law, Shares},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile},
 };
@@ -88,10 +88,10 @@ impl StrokePlanner<'_> {
     /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
     /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
     pub(crate) fn draw_from(&self, stroke: &Stroke, pose: JointPos) -> Result<Drawn, OutOfReach> {
-        let exact = Budget { simplify: 0.0, blend: 0.0, ..self.shares.path };
+        let exact = PathBudget { simplify: 0.0, blend: 0.0, ..self.shares.path };
         match self.settings.law {
             Law::TimeOptimal => {
-                let sections = |budget: &Budget| sections(stroke, budget);
+                let sections = |budget: &PathBudget| sections(stroke, budget);
                 self.follow(stroke, pose, sections(&self.shares.path))
                     .or_else(|_| self.follow(stroke, pose, sections(&exact)))
             }

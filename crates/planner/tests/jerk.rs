@@ -4,13 +4,13 @@
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::Machine;
 use planner::JointPath;
-use planner::path::{Budget, CornerBlend, sections};
+use planner::path::{PathBudget, CornerBlend, sections};
 use planner::time_parametrization::{SpeedCap, profile};
 
 mod machines;
 
-const BUDGET: Budget =
-    Budget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Spline, row: f64::INFINITY };
+const BUDGET: PathBudget =
+    PathBudget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Spline, row: f64::INFINITY };
 
 fn polyline(points: &[(f64, f64)]) -> Stroke {
     let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();

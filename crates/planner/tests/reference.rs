@@ -19,15 +19,15 @@ use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
 use planner::JointPath;
 use planner::joint_path::PathGeometry;
-use planner::path::{Budget, CornerBlend, Piece, sections};
+use planner::path::{PathBudget, CornerBlend, Piece, sections};
 use planner::time_parametrization::{SpeedCap, profile};
 use proptest::prelude::*;
 
 mod machines;
 
 /// Corners by 0.05 mm, nothing else: the rows' share of the tolerance is another matter.
-const BUDGET: Budget =
-    Budget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Parabola, row: f64::INFINITY };
+const BUDGET: PathBudget =
+    PathBudget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Parabola, row: f64::INFINITY };
 
 /// By how much a profile may take longer than the best, as a share.
 const EXCESS: f64 = 0.002;

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::joint_path::PathGeometry;
-use planner::path::{Budget, CornerBlend, sections};
+use planner::path::{PathBudget, CornerBlend, sections};
 use planner::placement::{Size, Wish, place};
 use planner::time_parametrization::{Profile, SpeedCap, profile, rough_profile};
 use planner::{JointPath, Settings, Trajectory};
@@ -285,7 +285,7 @@ fn nodes_and_time(profiles: &[Profile]) -> (usize, f64) {
 
 impl Stages {
     fn of(machine: &Machine, drawing: &Drawing) -> Result<Self> {
-        let budget = Budget {
+        let budget = PathBudget {
             chord: 0.5 * TOLERANCE,
             simplify: 0.3 * TOLERANCE,
             blend: 0.7 * TOLERANCE,

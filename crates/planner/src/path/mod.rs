@@ -26,7 +26,7 @@ const REGULAR: f64 = 1e-3;
 
 /// How far the planned path may be from the drawing, mm, by what makes it so.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Budget {
+pub struct PathBudget {
     /// Chords that stand for curves with a cusp.
     pub chord: f64,
     /// Straight pieces that stand for several.
@@ -66,7 +66,7 @@ impl Piece {
 pub type Section = Vec<Piece>;
 
 /// The smooth sections of a stroke, in order; none for a dot or a stroke that goes nowhere.
-pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
+pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
     let pieces = clean(stroke, budget.chord);
     let pieces = if budget.simplify > 0.0 { simplify::simplify(pieces, budget.simplify) } else { pieces };
     let sections = blend::sections(&pieces, budget.blend, budget.corner).into_iter().map(parametrise);
@@ -76,7 +76,7 @@ pub fn sections(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
 }
 
 /// Every piece of a stroke as a section of its own: the pen rests at all vertices but those that lie on a straight line.
-pub fn vertex_to_vertex(stroke: &Stroke, budget: &Budget) -> Vec<Section> {
+pub fn vertex_to_vertex(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
     clean(stroke, budget.chord).into_iter().map(|curve| parametrise(vec![curve])).collect()
 }
 
@@ -167,8 +167,8 @@ mod tests {
 
     use super::*;
 
-    const EXACT: Budget =
-        Budget { chord: 0.01, simplify: 0.0, blend: 0.0, corner: CornerBlend::Parabola, row: f64::INFINITY };
+    const EXACT: PathBudget =
+        PathBudget { chord: 0.01, simplify: 0.0, blend: 0.0, corner: CornerBlend::Parabola, row: f64::INFINITY };
 
     fn polyline(points: &[(f64, f64)]) -> Stroke {
         let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_reversal_is_a_stop_even_where_corners_are_blended() {
-        let budget = Budget { blend: 0.1, ..EXACT };
+        let budget = PathBudget { blend: 0.1, ..EXACT };
         assert_eq!(sections(&polyline(&[(0.0, 0.0), (5.0, 0.0), (2.0, 0.0)]), &budget).len(), 2);
     }
 
@@ -223,7 +223,7 @@ mod tests {
     fn a_chord_of_a_circle_runs_like_the_circle() {
         let points: Vec<(f64, f64)> =
             (0..=60).map(|k| libm::sincos(f64::from(k) * 0.05)).map(|(s, c)| (20.0 * c, 20.0 * s)).collect();
-        let sections = sections(&polyline(&points), &Budget { blend: 0.05, ..EXACT });
+        let sections = sections(&polyline(&points), &PathBudget { blend: 0.05, ..EXACT });
         assert_eq!(sections.len(), 1);
         // Neighbouring blends share their segments whole: nothing but the very ends stays straight.
         let straight: f64 = sections[0]
