@@ -74,14 +74,14 @@ const RESERVE: f64 = 0.02;
 
 /// How the tolerance is shared out, mm.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shares {
+pub(crate) struct ToleranceBudget {
     /// To linear motion between rows.
     pub(crate) row: f64,
     /// To the path itself.
     pub(crate) path: PathBudget,
 }
 
-impl Shares {
+impl ToleranceBudget {
     /// Rows need no more than the largest acceleration can bend the pen's way over a period: by `T² A / 8`. What is
     /// left goes to the corners.
     pub(crate) fn of(machine: &Machine, settings: &Settings) -> Self {

@@ -7,7 +7,7 @@ use crate::{
     Settings,
     joint_path::{PathGeometry, JointPath},
     path::{PathBudget, Section, sections, vertex_to_vertex},
-    settings::{Law, Shares},
+    settings::{Law, ToleranceBudget},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile},
 };
 
@@ -41,7 +41,7 @@ impl Drawn {
 pub(crate) struct StrokePlanner<'a> {
     pub(crate) machine: &'a Machine,
     pub(crate) settings: &'a Settings,
-    pub(crate) shares: Shares,
+    pub(crate) budget: ToleranceBudget,
 }
 
 impl StrokePlanner<'_> {
@@ -88,11 +88,11 @@ impl StrokePlanner<'_> {
     /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
     /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
     pub(crate) fn draw_from(&self, stroke: &Stroke, pose: JointPos) -> Result<Drawn, OutOfReach> {
-        let exact = PathBudget { simplify: 0.0, blend: 0.0, ..self.shares.path };
+        let exact = PathBudget { simplify: 0.0, blend: 0.0, ..self.budget.path };
         match self.settings.law {
             Law::TimeOptimal => {
                 let sections = |budget: &PathBudget| sections(stroke, budget);
-                self.follow(stroke, pose, sections(&self.shares.path))
+                self.follow(stroke, pose, sections(&self.budget.path))
                     .or_else(|_| self.follow(stroke, pose, sections(&exact)))
             }
             Law::Trapezoid | Law::FixedDuration { .. } => self.follow(stroke, pose, vertex_to_vertex(stroke, &exact)),
@@ -131,7 +131,7 @@ impl StrokePlanner<'_> {
             let profile = fixed_duration(easing, length, periods as f64 * period);
             return Move { geometry: path.geometry, profile, end, periods };
         }
-        let cap = SpeedCap { pen, row_deviation: self.shares.row, period };
+        let cap = SpeedCap { pen, row_deviation: self.budget.row, period };
         let profile = profile(self.machine, &path, &cap);
         let periods = whole_periods(profile.duration, period).max(1);
         Move { geometry: path.geometry, profile, end, periods }

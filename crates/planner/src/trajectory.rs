@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::{
     PlanError, Settings,
     joint_path::PathGeometry,
-    settings::{self, Shares},
+    settings::{self, ToleranceBudget},
     stroke::{Drawn, Move, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
 };
@@ -56,7 +56,7 @@ pub struct Trajectory<'a> {
     machine: &'a Machine,
     drawing: Drawing,
     settings: Settings,
-    shares: Shares,
+    budget: ToleranceBudget,
     /// All of it, where it is small.
     kept: Option<Vec<Leg>>,
     periods: u64,
@@ -98,12 +98,12 @@ pub fn plan<'a>(
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
     }
-    let shares = Shares::of(machine, settings);
+    let budget = ToleranceBudget::of(machine, settings);
     let trajectory = Trajectory {
         machine,
         drawing,
         settings: settings.clone(),
-        shares,
+        budget,
         kept: None,
         periods: 0,
         rows: 1,
@@ -202,7 +202,7 @@ impl Trajectory<'_> {
     }
 
     fn legs(&self) -> Legs<'_> {
-        let planner = StrokePlanner { machine: self.machine, settings: &self.settings, shares: self.shares };
+        let planner = StrokePlanner { machine: self.machine, settings: &self.settings, budget: self.budget };
         Legs {
             planner,
             strokes: &self.drawing.strokes,
