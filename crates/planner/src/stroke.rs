@@ -24,13 +24,13 @@ pub(crate) struct Move {
 
 /// A stroke as drawn from one of its poses.
 #[derive(Clone, Debug)]
-pub(crate) struct Drawn {
+pub(crate) struct PlannedStroke {
     pub(crate) start: JointPos,
     /// None for a dot.
     pub(crate) moves: Vec<Move>,
 }
 
-impl Drawn {
+impl PlannedStroke {
     pub(crate) fn end(&self) -> JointPos {
         self.moves.last().map_or(self.start, |last| last.end)
     }
@@ -51,20 +51,20 @@ impl StrokePlanner<'_> {
         &self,
         stroke: &Stroke,
         near: &JointPos,
-        ready: Option<Result<Drawn, OutOfReach>>,
-    ) -> Result<Drawn, OutOfReach> {
+        ready: Option<Result<PlannedStroke, OutOfReach>>,
+    ) -> Result<PlannedStroke, OutOfReach> {
         let start = stroke.start();
         self.machine.check_point(start)?;
         let poses = self.machine.poses(start, near).map_err(|fault| OutOfReach { point: start, fault })?;
         let mut first_error = None;
-        if let (Some(Ok(drawn)), Some(pose)) = (ready, poses.first())
-            && drawn.start == *pose
+        if let (Some(Ok(planned)), Some(pose)) = (ready, poses.first())
+            && planned.start == *pose
         {
-            return Ok(drawn);
+            return Ok(planned);
         }
         for pose in poses {
             match self.draw_from(stroke, pose) {
-                Ok(drawn) => return Ok(drawn),
+                Ok(planned) => return Ok(planned),
                 Err(error) => first_error = first_error.or(Some(error)),
             }
         }
@@ -87,7 +87,7 @@ impl StrokePlanner<'_> {
     ///
     /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
     /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
-    pub(crate) fn draw_from(&self, stroke: &Stroke, pose: JointPos) -> Result<Drawn, OutOfReach> {
+    pub(crate) fn draw_from(&self, stroke: &Stroke, pose: JointPos) -> Result<PlannedStroke, OutOfReach> {
         let exact = PathBudget { simplify: 0.0, blend: 0.0, ..self.budget.path };
         match self.settings.law {
             Law::TimeOptimal => {
@@ -99,16 +99,16 @@ impl StrokePlanner<'_> {
         }
     }
 
-    fn follow(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<Drawn, OutOfReach> {
-        let mut drawn = Drawn { start, moves: Vec::with_capacity(sections.len()) };
+    fn follow(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<PlannedStroke, OutOfReach> {
+        let mut planned = PlannedStroke { start, moves: Vec::with_capacity(sections.len()) };
         let speed = self.settings.speed_of(self.machine, stroke.pen);
         for section in sections {
             let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
-            let path = JointPath::lift(self.machine, section, drawn.end(), self.settings.tolerance)?;
+            let path = JointPath::lift(self.machine, section, planned.end(), self.settings.tolerance)?;
             let end = self.end_pose(&path, end)?;
-            drawn.moves.push(self.movement(path, end, speed));
+            planned.moves.push(self.movement(path, end, speed));
         }
-        Ok(drawn)
+        Ok(planned)
     }
 
     /// The pose at the end of a drawn path, unwrapped along its intervals.

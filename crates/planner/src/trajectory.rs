@@ -16,7 +16,7 @@ use crate::{
     PlanError, Settings,
     joint_path::PathGeometry,
     settings::{self, ToleranceBudget},
-    stroke::{Drawn, Move, StrokePlanner, whole_periods},
+    stroke::{PlannedStroke, Move, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
 };
 
@@ -225,7 +225,7 @@ struct Legs<'a> {
     /// The stroke whose legs come next.
     next: usize,
     /// What was planned of the strokes from `next` on.
-    batch: VecDeque<Option<Result<Drawn, OutOfReach>>>,
+    batch: VecDeque<Option<Result<PlannedStroke, OutOfReach>>>,
     /// Where the machine will be when the batch is drawn, as far as one knows.
     guess: JointPos,
     /// Where it is after all legs so far.
@@ -261,13 +261,13 @@ impl Legs<'_> {
         let (index, stroke) = (self.next, &self.strokes[self.next]);
         self.next += 1;
         let ready = self.batch.pop_front().flatten();
-        let drawn = self.planner.draw(stroke, &self.here, ready).map_err(|source| PlanError::OutOfReach {
+        let planned = self.planner.draw(stroke, &self.here, ready).map_err(|source| PlanError::OutOfReach {
             stroke: index,
             pen: stroke.pen,
             span: stroke.source(),
             source,
         })?;
-        self.travel(drawn.start);
+        self.travel(planned.start);
         if index == 0 && self.queue.is_empty() {
             // The first stroke begins where the plan does: the plan still begins with the pen up.
             self.queue.push_back(Leg::Pen { pen: 0, periods: 1 });
@@ -275,10 +275,10 @@ impl Legs<'_> {
         let pen = self.planner.machine.pen();
         // A dot is nothing but its dwell: without any there would be no ink in the plan.
         let dwell =
-            whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(drawn.moves.is_empty()));
+            whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(planned.moves.is_empty()));
         self.queue.push_back(Leg::Pen { pen: stroke.pen.0, periods: dwell });
-        self.here = drawn.end();
-        self.queue.extend(drawn.moves.into_iter().map(Leg::Move));
+        self.here = planned.end();
+        self.queue.extend(planned.moves.into_iter().map(Leg::Move));
         self.is_down = true;
         Ok(())
     }
