@@ -14,7 +14,7 @@ use crate::{
 /// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops and pen events fall on
 /// rows: between rows motors move linearly, and a stop between two rows would be cut.
 #[derive(Clone, Debug)]
-pub(crate) struct Move {
+pub(crate) struct PathMotion {
     pub(crate) geometry: PathGeometry,
     pub(crate) profile: Profile,
     /// The pose at its end.
@@ -27,12 +27,12 @@ pub(crate) struct Move {
 pub(crate) struct PlannedStroke {
     pub(crate) start: JointPos,
     /// None for a dot.
-    pub(crate) moves: Vec<Move>,
+    pub(crate) motions: Vec<PathMotion>,
 }
 
 impl PlannedStroke {
     pub(crate) fn end(&self) -> JointPos {
-        self.moves.last().map_or(self.start, |last| last.end)
+        self.motions.last().map_or(self.start, |last| last.end)
     }
 }
 
@@ -100,13 +100,13 @@ impl StrokePlanner<'_> {
     }
 
     fn follow(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<PlannedStroke, OutOfReach> {
-        let mut planned = PlannedStroke { start, moves: Vec::with_capacity(sections.len()) };
+        let mut planned = PlannedStroke { start, motions: Vec::with_capacity(sections.len()) };
         let speed = self.settings.speed_of(self.machine, stroke.pen);
         for section in sections {
             let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
             let path = JointPath::lift(self.machine, section, planned.end(), self.settings.tolerance)?;
             let end = self.end_pose(&path, end)?;
-            planned.moves.push(self.movement(path, end, speed));
+            planned.motions.push(self.movement(path, end, speed));
         }
         Ok(planned)
     }
@@ -121,7 +121,7 @@ impl StrokePlanner<'_> {
     }
 
     /// Lays the time law upon a path.
-    fn movement(&self, path: JointPath, end: JointPos, pen: f64) -> Move {
+    fn movement(&self, path: JointPath, end: JointPos, pen: f64) -> PathMotion {
         let period = self.period();
         if let (Law::FixedDuration { easing, segment_time_s }, PathGeometry::Drawn(_, section)) =
             (self.settings.law, &path.geometry)
@@ -129,16 +129,16 @@ impl StrokePlanner<'_> {
             let periods = (segment_time_s / period).round().max(1.0) as u64;
             let length = section.iter().map(crate::path::Piece::length).sum();
             let profile = fixed_duration(easing, length, periods as f64 * period);
-            return Move { geometry: path.geometry, profile, end, periods };
+            return PathMotion { geometry: path.geometry, profile, end, periods };
         }
         let cap = SpeedCap { pen, row_deviation: self.budget.row, period };
         let profile = profile(self.machine, &path, &cap);
         let periods = whole_periods(profile.duration, period).max(1);
-        Move { geometry: path.geometry, profile, end, periods }
+        PathMotion { geometry: path.geometry, profile, end, periods }
     }
 
     /// The way with the pen up from pose to pose; nothing where there is none.
-    pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Option<Move> {
+    pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Option<PathMotion> {
         let path = JointPath::travel(self.machine, from, to)?;
         Some(self.movement(path, to, self.machine.pen().max_travel_speed_mm_s))
     }

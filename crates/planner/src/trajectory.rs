@@ -16,7 +16,7 @@ use crate::{
     PlanError, Settings,
     joint_path::PathGeometry,
     settings::{self, ToleranceBudget},
-    stroke::{PlannedStroke, Move, StrokePlanner, whole_periods},
+    stroke::{PlannedStroke, PathMotion, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
 };
 
@@ -28,23 +28,23 @@ const KEPT_PHASES: usize = 1 << 19;
 
 /// One step of a plan.
 #[derive(Clone, Debug)]
-enum Leg {
+enum Motion {
     /// Motion along a joint path, from rest to rest.
-    Move(Move),
+    Path(PathMotion),
     /// The pen changes to this state (0 is up) and the motors stand still for so many periods.
     Pen { pen: u16, periods: u64 },
 }
 
-impl Leg {
+impl Motion {
     fn periods(&self) -> u64 {
         match self {
-            Self::Move(Move { periods, .. }) | Self::Pen { periods, .. } => *periods,
+            Self::Path(PathMotion { periods, .. }) | Self::Pen { periods, .. } => *periods,
         }
     }
 
     fn rows(&self) -> u64 {
         match self {
-            Self::Move(Move { periods, .. }) => *periods,
+            Self::Path(PathMotion { periods, .. }) => *periods,
             Self::Pen { periods, .. } => u64::from(*periods > 0),
         }
     }
@@ -58,7 +58,7 @@ pub struct Trajectory<'a> {
     settings: Settings,
     budget: ToleranceBudget,
     /// All of it, where it is small.
-    kept: Option<Vec<Leg>>,
+    kept: Option<Vec<Motion>>,
     periods: u64,
     rows: u64,
     times: Times,
@@ -113,25 +113,25 @@ pub fn plan<'a>(
     let period = settings.period_us as f64 * 1e-6;
     let (mut periods, mut rows, mut times, mut limiting) = (0, 1, Times::default(), LimitingConstraints::default());
     let (mut kept, mut phases) = (Some(Vec::new()), 0);
-    let mut legs = trajectory.legs();
-    while let Some(leg) = legs.next_leg()? {
-        let time = leg.periods() as f64 * period;
-        match &leg {
-            Leg::Pen { .. } => times.lifting += time,
-            Leg::Move(Move { geometry: PathGeometry::Travel(..), .. }) => times.travel += time,
-            Leg::Move(Move { profile, .. }) => {
+    let mut motions = trajectory.motions();
+    while let Some(motion) = motions.next_motion()? {
+        let time = motion.periods() as f64 * period;
+        match &motion {
+            Motion::Pen { .. } => times.lifting += time,
+            Motion::Path(PathMotion { geometry: PathGeometry::Travel(..), .. }) => times.travel += time,
+            Motion::Path(PathMotion { profile, .. }) => {
                 times.drawing += time;
                 limiting.add(&profile.limiting, time / profile.duration);
                 phases += profile.phases.len();
             }
         }
-        periods += leg.periods();
-        rows += leg.rows();
+        periods += motion.periods();
+        rows += motion.rows();
         if phases > KEPT_PHASES {
             kept = None;
         }
         if let Some(kept) = &mut kept {
-            kept.push(leg);
+            kept.push(motion);
         }
     }
     Ok(Trajectory { kept, periods, rows, times, limiting, ..trajectory })
@@ -186,13 +186,13 @@ impl Trajectory<'_> {
     pub fn rows(&self) -> Rows<'_> {
         let source = match &self.kept {
             Some(kept) => Source::Kept(kept.iter()),
-            None => Source::Planned(self.legs()),
+            None => Source::Planned(self.motions()),
         };
         Rows {
             machine: self.machine,
             period_us: self.settings.period_us,
             source,
-            leg: None,
+            motion: None,
             cursor: Cursor::default(),
             t_us: 0,
             pen: 0,
@@ -201,9 +201,9 @@ impl Trajectory<'_> {
         }
     }
 
-    fn legs(&self) -> Legs<'_> {
+    fn motions(&self) -> Motions<'_> {
         let planner = StrokePlanner { machine: self.machine, settings: &self.settings, budget: self.budget };
-        Legs {
+        Motions {
             planner,
             strokes: &self.drawing.strokes,
             next: 0,
@@ -217,28 +217,28 @@ impl Trajectory<'_> {
     }
 }
 
-/// The legs of a plan, in order, planned as they are asked for.
+/// The motions of a plan, in order, planned as they are asked for.
 #[derive(Clone, Debug)]
-struct Legs<'a> {
+struct Motions<'a> {
     planner: StrokePlanner<'a>,
     strokes: &'a [Stroke],
-    /// The stroke whose legs come next.
+    /// The stroke whose motions come next.
     next: usize,
     /// What was planned of the strokes from `next` on.
     batch: VecDeque<Option<Result<PlannedStroke, OutOfReach>>>,
     /// Where the machine will be when the batch is drawn, as far as one knows.
     guess: JointPos,
-    /// Where it is after all legs so far.
+    /// Where it is after all motions so far.
     here: JointPos,
-    queue: VecDeque<Leg>,
-    /// Whether the pen has still to be lifted after all legs so far.
+    queue: VecDeque<Motion>,
+    /// Whether the pen has still to be lifted after all motions so far.
     is_down: bool,
     parked: bool,
 }
 
-impl Legs<'_> {
-    /// The next leg, or the reason why there is none where one should be.
-    fn next_leg(&mut self) -> Result<Option<Leg>, PlanError> {
+impl Motions<'_> {
+    /// The next motion, or the reason why there is none where one should be.
+    fn next_motion(&mut self) -> Result<Option<Motion>, PlanError> {
         while self.queue.is_empty() {
             if self.next < self.strokes.len() {
                 self.stroke()?;
@@ -270,15 +270,15 @@ impl Legs<'_> {
         self.travel(planned.start);
         if index == 0 && self.queue.is_empty() {
             // The first stroke begins where the plan does: the plan still begins with the pen up.
-            self.queue.push_back(Leg::Pen { pen: 0, periods: 1 });
+            self.queue.push_back(Motion::Pen { pen: 0, periods: 1 });
         }
         let pen = self.planner.machine.pen();
         // A dot is nothing but its dwell: without any there would be no ink in the plan.
         let dwell =
-            whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(planned.moves.is_empty()));
-        self.queue.push_back(Leg::Pen { pen: stroke.pen.0, periods: dwell });
+            whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(planned.motions.is_empty()));
+        self.queue.push_back(Motion::Pen { pen: stroke.pen.0, periods: dwell });
         self.here = planned.end();
-        self.queue.extend(planned.moves.into_iter().map(Leg::Move));
+        self.queue.extend(planned.motions.into_iter().map(Motion::Path));
         self.is_down = true;
         Ok(())
     }
@@ -291,9 +291,9 @@ impl Legs<'_> {
             let whole = whole_periods(self.planner.machine.pen().lift_time_s, self.planner.period());
             let overlap = (self.planner.settings.lift_overlap / self.planner.period() + 1e-9).floor() as u64;
             let overlap = overlap.min(way.as_ref().map_or(0, |way| way.periods));
-            self.queue.push_back(Leg::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
+            self.queue.push_back(Motion::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
         }
-        self.queue.extend(way.map(Leg::Move));
+        self.queue.extend(way.map(Motion::Path));
         self.here = to;
     }
 
@@ -320,19 +320,19 @@ impl Legs<'_> {
     }
 }
 
-/// Where rows have their legs from.
+/// Where rows have their motions from.
 #[derive(Clone, Debug)]
 enum Source<'a> {
-    Kept(std::slice::Iter<'a, Leg>),
-    Planned(Legs<'a>),
+    Kept(std::slice::Iter<'a, Motion>),
+    Planned(Motions<'a>),
 }
 
 impl<'a> Source<'a> {
-    fn next_leg(&mut self) -> Option<Cow<'a, Leg>> {
+    fn next_motion(&mut self) -> Option<Cow<'a, Motion>> {
         match self {
-            Self::Kept(legs) => legs.next().map(Cow::Borrowed),
+            Self::Kept(motions) => motions.next().map(Cow::Borrowed),
             // Whether every stroke can be drawn was seen when the plan was made.
-            Self::Planned(legs) => legs.next_leg().ok().flatten().map(Cow::Owned),
+            Self::Planned(motions) => motions.next_motion().ok().flatten().map(Cow::Owned),
         }
     }
 }
@@ -343,8 +343,8 @@ pub struct Rows<'a> {
     machine: &'a Machine,
     period_us: u64,
     source: Source<'a>,
-    /// The leg at hand.
-    leg: Option<Cow<'a, Leg>>,
+    /// The motion at hand.
+    motion: Option<Cow<'a, Motion>>,
     cursor: Cursor,
     t_us: u64,
     pen: u16,
@@ -358,30 +358,30 @@ impl Iterator for Rows<'_> {
 
     fn next(&mut self) -> Option<ExactRow> {
         loop {
-            if self.leg.is_none() {
-                self.leg = self.source.next_leg();
+            if self.motion.is_none() {
+                self.motion = self.source.next_motion();
                 self.cursor = Cursor::default();
             }
-            match self.leg.as_deref() {
+            match self.motion.as_deref() {
                 None => {
                     let last = !self.finished;
                     self.finished = true;
                     return last.then(|| self.emit());
                 }
-                Some(Leg::Pen { pen, periods }) => {
+                Some(Motion::Pen { pen, periods }) => {
                     self.pen = *pen;
                     let row = (*periods > 0).then(|| self.emit());
                     self.t_us += periods * self.period_us;
-                    self.leg = None;
+                    self.motion = None;
                     if row.is_some() {
                         return row;
                     }
                 }
-                Some(Leg::Move(movement)) if self.cursor.period == movement.periods => {
+                Some(Motion::Path(movement)) if self.cursor.period == movement.periods => {
                     self.pose = movement.end;
-                    self.leg = None;
+                    self.motion = None;
                 }
-                Some(Leg::Move(movement)) => {
+                Some(Motion::Path(movement)) => {
                     self.pose = self.cursor.pose(self.machine, movement, &self.pose);
                     let row = self.emit();
                     self.cursor.period += 1;
@@ -405,8 +405,8 @@ struct Cursor {
 
 impl Cursor {
     /// The pose now; `near` is the one before.
-    fn pose(&mut self, machine: &Machine, movement: &Move, near: &JointPos) -> JointPos {
-        let Move { geometry, profile, periods, .. } = movement;
+    fn pose(&mut self, machine: &Machine, movement: &PathMotion, near: &JointPos) -> JointPos {
+        let PathMotion { geometry, profile, periods, .. } = movement;
         // The profile is stretched to a whole number of periods, which only slows it down.
         let time = profile.duration * (self.period as f64 / *periods as f64);
         while self.phase + 1 < profile.phases.len()
