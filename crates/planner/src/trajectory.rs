@@ -23,8 +23,8 @@ use crate::{
 /// How much geometry is planned at once, in curves of the drawing.
 const BATCH: usize = 4096;
 
-/// A plan whose motion has no more phases than this is kept, so that its rows can be had again without planning anew.
-const KEPT_PHASES: usize = 1 << 19;
+/// A plan whose motion has no more phases than this is cached, so that its rows can be had again without planning anew.
+const CACHED_PHASES: usize = 1 << 19;
 
 /// One step of a plan.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ pub struct Trajectory<'a> {
     settings: Settings,
     budget: ToleranceBudget,
     /// All of it, where it is small.
-    kept: Option<Vec<Motion>>,
+    cached: Option<Vec<Motion>>,
     periods: u64,
     rows: u64,
     times: Times,
@@ -104,7 +104,7 @@ pub fn plan<'a>(
         drawing,
         settings: settings.clone(),
         budget,
-        kept: None,
+        cached: None,
         periods: 0,
         rows: 1,
         times: Times::default(),
@@ -112,7 +112,7 @@ pub fn plan<'a>(
     };
     let period = settings.period_us as f64 * 1e-6;
     let (mut periods, mut rows, mut times, mut limiting) = (0, 1, Times::default(), LimitingConstraints::default());
-    let (mut kept, mut phases) = (Some(Vec::new()), 0);
+    let (mut cached, mut phases) = (Some(Vec::new()), 0);
     let mut motions = trajectory.motions();
     while let Some(motion) = motions.next_motion()? {
         let time = motion.periods() as f64 * period;
@@ -127,14 +127,14 @@ pub fn plan<'a>(
         }
         periods += motion.periods();
         rows += motion.rows();
-        if phases > KEPT_PHASES {
-            kept = None;
+        if phases > CACHED_PHASES {
+            cached = None;
         }
-        if let Some(kept) = &mut kept {
-            kept.push(motion);
+        if let Some(cached) = &mut cached {
+            cached.push(motion);
         }
     }
-    Ok(Trajectory { kept, periods, rows, times, limiting, ..trajectory })
+    Ok(Trajectory { cached, periods, rows, times, limiting, ..trajectory })
 }
 
 /// Looks for strokes that the machine cannot draw, in the drawing's order; gives the first.
@@ -167,7 +167,7 @@ impl Trajectory<'_> {
         self.times
     }
 
-    /// For how long of the drawing time each limit was what kept it from being shorter, s.
+    /// For how long of the drawing time each limit was what cached it from being shorter, s.
     pub fn limiting(&self) -> LimitingConstraints {
         self.limiting
     }
@@ -184,8 +184,8 @@ impl Trajectory<'_> {
 
     /// The rows, one period apart; while the motors stand still for the pen only the first row is given.
     pub fn rows(&self) -> Rows<'_> {
-        let source = match &self.kept {
-            Some(kept) => Source::Kept(kept.iter()),
+        let source = match &self.cached {
+            Some(cached) => Source::Cached(cached.iter()),
             None => Source::Planned(self.motions()),
         };
         Rows {
@@ -323,14 +323,14 @@ impl Motions<'_> {
 /// Where rows have their motions from.
 #[derive(Clone, Debug)]
 enum Source<'a> {
-    Kept(std::slice::Iter<'a, Motion>),
+    Cached(std::slice::Iter<'a, Motion>),
     Planned(Motions<'a>),
 }
 
 impl<'a> Source<'a> {
     fn next_motion(&mut self) -> Option<Cow<'a, Motion>> {
         match self {
-            Self::Kept(motions) => motions.next().map(Cow::Borrowed),
+            Self::Cached(motions) => motions.next().map(Cow::Borrowed),
             // Whether every stroke can be drawn was seen when the plan was made.
             Self::Planned(motions) => motions.next_motion().ok().flatten().map(Cow::Owned),
         }
@@ -460,11 +460,11 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             pool.install(|| {
                 let mut trajectory = plan(&machine, crowd(), &Settings::new(0.1, 10_000)).expect("a plan");
-                let kept: Vec<ExactRow> = trajectory.rows().collect();
-                assert_eq!(kept.len() as u64, trajectory.row_count());
-                assert!(trajectory.kept.take().is_some());
-                assert!(trajectory.rows().eq(kept.iter().copied()));
-                kept
+                let cached: Vec<ExactRow> = trajectory.rows().collect();
+                assert_eq!(cached.len() as u64, trajectory.row_count());
+                assert!(trajectory.cached.take().is_some());
+                assert!(trajectory.rows().eq(cached.iter().copied()));
+                cached
             })
         };
         let alone = in_pool(1);
