@@ -47,7 +47,7 @@ pub(crate) struct StrokePlanner<'a> {
 impl StrokePlanner<'_> {
     /// Plans a stroke from the pose nearest to `near` from which all of it can be drawn: a stroke around the base may run
     /// into a joint limit from one turn and not from another. `ready` is what was found for a pose before.
-    pub(crate) fn draw(
+    pub(crate) fn plan(
         &self,
         stroke: &Stroke,
         near: &JointPos,
@@ -63,7 +63,7 @@ impl StrokePlanner<'_> {
             return Ok(planned);
         }
         for pose in poses {
-            match self.draw_from(stroke, pose) {
+            match self.plan_from(stroke, pose) {
                 Ok(planned) => return Ok(planned),
                 Err(error) => first_error = first_error.or(Some(error)),
             }
@@ -74,7 +74,7 @@ impl StrokePlanner<'_> {
     }
 
     /// The pose near `near` in which a stroke would most likely begin, and one in which it would end.
-    pub(crate) fn guess(&self, stroke: &Stroke, near: &JointPos) -> Option<(JointPos, JointPos)> {
+    pub(crate) fn predict_poses(&self, stroke: &Stroke, near: &JointPos) -> Option<(JointPos, JointPos)> {
         let pose = *self.machine.poses(stroke.start(), near).ok()?.first()?;
         let mut end = pose;
         for vertex in stroke.vertices().iter() {
@@ -87,26 +87,26 @@ impl StrokePlanner<'_> {
     ///
     /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
     /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
-    pub(crate) fn draw_from(&self, stroke: &Stroke, pose: JointPos) -> Result<PlannedStroke, OutOfReach> {
+    pub(crate) fn plan_from(&self, stroke: &Stroke, pose: JointPos) -> Result<PlannedStroke, OutOfReach> {
         let exact = PathBudget { simplify: 0.0, blend: 0.0, ..self.budget.path };
         match self.settings.law {
             Law::TimeOptimal => {
                 let sections = |budget: &PathBudget| sections(stroke, budget);
-                self.follow(stroke, pose, sections(&self.budget.path))
-                    .or_else(|_| self.follow(stroke, pose, sections(&exact)))
+                self.plan_sections(stroke, pose, sections(&self.budget.path))
+                    .or_else(|_| self.plan_sections(stroke, pose, sections(&exact)))
             }
-            Law::Trapezoid | Law::FixedDuration { .. } => self.follow(stroke, pose, vertex_to_vertex(stroke, &exact)),
+            Law::Trapezoid | Law::FixedDuration { .. } => self.plan_sections(stroke, pose, vertex_to_vertex(stroke, &exact)),
         }
     }
 
-    fn follow(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<PlannedStroke, OutOfReach> {
+    fn plan_sections(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<PlannedStroke, OutOfReach> {
         let mut planned = PlannedStroke { start, motions: Vec::with_capacity(sections.len()) };
         let speed = self.settings.speed_of(self.machine, stroke.pen);
         for section in sections {
             let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
             let path = JointPath::lift(self.machine, section, planned.end(), self.settings.tolerance)?;
             let end = self.end_pose(&path, end)?;
-            planned.motions.push(self.movement(path, end, speed));
+            planned.motions.push(self.parametrize(path, end, speed));
         }
         Ok(planned)
     }
@@ -121,7 +121,7 @@ impl StrokePlanner<'_> {
     }
 
     /// Lays the time law upon a path.
-    fn movement(&self, path: JointPath, end: JointPos, pen: f64) -> PathMotion {
+    fn parametrize(&self, path: JointPath, end: JointPos, pen: f64) -> PathMotion {
         let period = self.period();
         if let (Law::FixedDuration { easing, segment_time_s }, PathGeometry::Drawn(_, section)) =
             (self.settings.law, &path.geometry)
@@ -140,7 +140,7 @@ impl StrokePlanner<'_> {
     /// The way with the pen up from pose to pose; nothing where there is none.
     pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Option<PathMotion> {
         let path = JointPath::travel(self.machine, from, to)?;
-        Some(self.movement(path, to, self.machine.pen().max_travel_speed_mm_s))
+        Some(self.parametrize(path, to, self.machine.pen().max_travel_speed_mm_s))
     }
 
     /// Time between rows, s.

@@ -261,7 +261,7 @@ impl Motions<'_> {
         let (index, stroke) = (self.next, &self.strokes[self.next]);
         self.next += 1;
         let ready = self.batch.pop_front().flatten();
-        let planned = self.planner.draw(stroke, &self.here, ready).map_err(|source| PlanError::OutOfReach {
+        let planned = self.planner.plan(stroke, &self.here, ready).map_err(|source| PlanError::OutOfReach {
             stroke: index,
             pen: stroke.pen,
             span: stroke.source(),
@@ -302,7 +302,7 @@ impl Motions<'_> {
         let mut starts = Vec::new();
         let mut size = 0;
         for stroke in &self.strokes[self.next..] {
-            let guess = self.planner.guess(stroke, &self.guess);
+            let guess = self.planner.predict_poses(stroke, &self.guess);
             if let Some((_, end)) = guess {
                 self.guess = end;
             }
@@ -314,7 +314,7 @@ impl Motions<'_> {
         }
         let planner = self.planner;
         let plan = |(stroke, start): (&Stroke, Option<JointPos>)| {
-            start.map(|start| planner.draw_from(stroke, start))
+            start.map(|start| planner.plan_from(stroke, start))
         };
         self.batch = starts.into_par_iter().map(plan).collect::<Vec<_>>().into();
     }
