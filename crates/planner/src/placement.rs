@@ -7,18 +7,18 @@ use crate::PlanError;
 
 /// What was asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct PlacementOptions {
     /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding box stays in place.
-    pub rotate: f64,
+    pub rotate_rad: f64,
     /// How large and where.
-    pub size: Size,
+    pub scale: Scale,
 }
 
 /// How large a drawing becomes and where its origin goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Size {
+pub enum Scale {
     /// Scaled by a factor about the drawing's origin, which goes to `origin`, in mm from the sheet's lower-left corner.
-    Given {
+    Explicit {
         /// The factor; 1 is life-size.
         scale: f64,
         /// Where the drawing's (0, 0) goes.
@@ -28,26 +28,26 @@ pub enum Size {
     Fit,
 }
 
-impl Default for Wish {
+impl Default for PlacementOptions {
     /// Life-size, the drawing's origin at the sheet's lower-left corner.
     fn default() -> Self {
-        Self { rotate: 0.0, size: Size::Given { scale: 1.0, origin: Vec2::ZERO } }
+        Self { rotate_rad: 0.0, scale: Scale::Explicit { factor: 1.0, origin: Vec2::ZERO } }
     }
 }
 
-/// The map from drawing mm to machine mm that the wish asks for.
+/// The map from drawing mm to machine mm that the options asks for.
 ///
 /// # Errors
 /// When a number is not finite, the scale not positive, or nothing fits.
-pub fn place(machine: &Machine, drawing: &Drawing, wish: &Wish) -> Result<Affine, PlanError> {
+pub fn place(machine: &Machine, drawing: &Drawing, options: &PlacementOptions) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
     let setting = |what: &str| PlanError::Setting { what: what.into() };
-    if !wish.rotate.is_finite() {
+    if !options.rotate_rad.is_finite() {
         return Err(setting("the rotation must be a finite angle"));
     }
-    let turned = turn(drawing, bounds, wish.rotate);
-    match wish.size {
-        Size::Given { scale, origin } => {
+    let turned = rotation_about_corner(drawing, bounds, options.rotate_rad);
+    match options.scale {
+        Scale::Explicit { factor, origin_mm } => {
             if !(scale > 0.0 && scale.is_finite() && origin.is_finite()) {
                 return Err(setting("the scale must be a positive number and the place finite"));
             }
@@ -55,7 +55,7 @@ pub fn place(machine: &Machine, drawing: &Drawing, wish: &Wish) -> Result<Affine
             let corner = Vec2::new(sheet.x0, sheet.y0) + origin;
             Ok(Affine::translate(corner) * Affine::scale(scale) * turned)
         }
-        Size::Fit => {
+        Scale::Fit => {
             let mut turned_drawing = drawing.clone();
             turned_drawing.transform(turned);
             Ok(fit(machine, &turned_drawing)? * turned)
@@ -64,7 +64,7 @@ pub fn place(machine: &Machine, drawing: &Drawing, wish: &Wish) -> Result<Affine
 }
 
 /// Rotation after which the lower-left corner of the ink's bounding box is where it was. Quarter turns are exact.
-fn turn(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine {
+fn rotation_about_corner(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine {
     if angle == 0.0 {
         return Affine::IDENTITY;
     }

@@ -3,7 +3,7 @@
 
 use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
-use planner::placement::{Size, Wish, place};
+use planner::placement::{Scale, PlacementOptions, place};
 use planner::{Easing, ExactRow, Law, PlanError, Settings, plan};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -65,9 +65,9 @@ fn drawing() -> impl Strategy<Value = Drawing> {
 }
 
 fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {
-    let wish = Wish { rotate: 0.0, size: Size::Fit };
+    let options = PlacementOptions { rotate_rad: 0.0, scale: Scale::Fit };
     let mut placed = drawing.clone();
-    placed.transform(place(machine, drawing, &wish).expect("it fits"));
+    placed.transform(place(machine, drawing, &options).expect("it fits"));
     placed
 }
 
@@ -317,7 +317,7 @@ fn an_empty_drawing_is_refused() {
 #[test]
 fn life_size_puts_the_origin_at_the_sheets_corner() {
     let machine = machines::arm();
-    let map = place(&machine, &line(&[(0.0, 0.0), (10.0, 10.0)]), &Wish::default()).unwrap();
+    let map = place(&machine, &line(&[(0.0, 0.0), (10.0, 10.0)]), &PlacementOptions::default()).unwrap();
     assert_eq!(map.as_coeffs(), [1.0, 0.0, 0.0, 1.0, 12.7, 76.2]);
 }
 
@@ -325,9 +325,9 @@ fn life_size_puts_the_origin_at_the_sheets_corner() {
 fn a_quarter_turn_keeps_the_lower_left_corner_of_the_ink() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 20.0), (40.0, 60.0)]);
-    let wish = Wish { rotate: std::f64::consts::FRAC_PI_2, ..Wish::default() };
+    let options = PlacementOptions { rotate_rad: std::f64::consts::FRAC_PI_2, ..PlacementOptions::default() };
     let mut placed = drawing.clone();
-    placed.transform(place(&machine, &drawing, &wish).unwrap());
+    placed.transform(place(&machine, &drawing, &options).unwrap());
     assert_eq!(placed.bounding_box().unwrap(), Rect::new(10.0, 20.0, 50.0, 50.0));
 }
 

@@ -10,7 +10,7 @@ use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::joint_path::PathGeometry;
 use planner::path::{PathBudget, CornerBlend, sections};
-use planner::placement::{Size, Wish, place};
+use planner::placement::{Scale, PlacementOptions, place};
 use planner::time_parametrization::{Profile, SpeedCap, profile, rough_profile};
 use planner::{JointPath, Settings, Trajectory};
 
@@ -68,7 +68,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
     let tenth_emission = emission_seconds(&machine, &tenth_plan)?;
     let arm = arm()?;
     let mut fitted = once.clone();
-    fitted.transform(place(&arm, &once, &Wish { rotate: 0.0, size: Size::Fit })?);
+    fitted.transform(place(&arm, &once, &PlacementOptions { rotate_rad: 0.0, scale: Scale::Fit })?);
     let arm_trajectory = planner::plan(&arm, fitted, &settings)?;
     let arm_emission = self::emission(&arm, &arm_trajectory)?;
 
