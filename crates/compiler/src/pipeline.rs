@@ -3,8 +3,8 @@
 use drawing::{Affine, Drawing, Pen, Point, Segment};
 use kinematics::{JointPos, Machine};
 use plan::{Header, Limits, Motor};
-use planner::placement::{self, Wish};
-use planner::{Law, PlanError, Settings, Trajectory};
+use planner::placement::{self, PlacementOptions};
+use planner::{PlanError, Settings, TimingLaw, Trajectory};
 use verify::Certificate;
 
 /// In which order strokes are drawn.
@@ -37,13 +37,13 @@ pub struct Request {
     /// In which order strokes are drawn.
     pub order: Order,
     /// Where the drawing goes.
-    pub wish: Wish,
+    pub wish: PlacementOptions,
     /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
     pub pen_speeds: Vec<(Pen, f64)>,
     /// For how much of the time that a lift takes the motors may already travel, s.
     pub lift_overlap_s: f64,
     /// How speed goes along the strokes.
-    pub law: Law,
+    pub law: TimingLaw,
     /// Whether the motors' limits may be broken, as some laws do: the certificate says so, and the plan is written.
     pub allow_over_limit: bool,
 }
@@ -127,7 +127,7 @@ pub fn compile<'a>(
     let mut placed = drawing.clone();
     placed.transform(placement);
     planner::check_reach(machine, &placed)?;
-    let beyond_sheet_mm = placement::beyond_sheet(machine, &placed);
+    let beyond_sheet_mm = placement::beyond_sheet_mm(machine, &placed);
 
     let (ordered, ordering) = match &request.order {
         Order::File => (placed.clone(), None),
@@ -143,9 +143,9 @@ pub fn compile<'a>(
 
     progress(Step::Planning);
     let settings = Settings {
-        pen_speeds: request.pen_speeds.clone(),
-        law: request.law,
-        lift_overlap: request.lift_overlap_s,
+        pen_speeds_mm_s: request.pen_speeds.clone(),
+        timing_law: request.law,
+        lift_overlap_s: request.lift_overlap_s,
         ..Settings::new(request.tolerance_mm, request.period_us)
     };
     let trajectory = planner::plan(machine, ordered, &settings)?;

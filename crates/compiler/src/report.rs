@@ -32,11 +32,11 @@ pub fn summary(compiled: &Compiled<'_>) -> Value {
         "beyond_sheet_mm": compiled.beyond_sheet_mm,
         "rows": compiled.header.rows,
         "duration_s": compiled.header.duration_us as f64 * 1e-6,
-        "drawing_s": times.drawing,
-        "travel_s": times.travel,
-        "lifting_s": times.lifting,
+        "drawing_s": times.drawing_s,
+        "travel_s": times.travel_s,
+        "lifting_s": times.lifting_s,
         "limited_by_s": limited_by(compiled).into_iter().map(|(what, time)| (what, json!(time))).collect::<serde_json::Map<_, _>>(),
-        "pen_up_share": (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
+        "pen_up_share": (times.travel_s + times.lifting_s) / (compiled.header.duration_us as f64 * 1e-6),
         "placement": compiled.placement.as_coeffs(),
         "pen_changes": pen_changes(compiled.ordered()),
         "ordering": compiled.ordering.as_ref().map(|report| json!({
@@ -136,10 +136,10 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
         text,
         "\ntime {}: drawing {}, travel {} ({}), pen lifts and drops {}",
         clock(compiled.header.duration_us as f64 * 1e-6),
-        clock(times.drawing),
-        clock(times.travel),
+        clock(times.drawing_s),
+        clock(times.travel_s),
         metres(certificate.travel_mm),
-        clock(times.lifting)
+        clock(times.lifting_s)
     );
     text.push_str(&limited_by_text(compiled));
     let [before, after] = [&compiled.placed, compiled.ordered()].map(pen_changes);
@@ -150,7 +150,7 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
         let _ = writeln!(
             text,
             "pen up for {:.1} % of the time: {} straight from stroke to stroke instead of {} in the file's order, with lifts and drops {} instead of {}",
-            100.0 * (times.travel + times.lifting) / (compiled.header.duration_us as f64 * 1e-6),
+            100.0 * (times.travel_s + times.lifting_s) / (compiled.header.duration_us as f64 * 1e-6),
             metres(report.travel_mm_after),
             metres(report.travel_mm_before),
             clock(report.travel_cost_after),
@@ -164,12 +164,12 @@ pub fn summary_text(machine: &Machine, compiled: &Compiled<'_>) -> String {
 fn limited_by(compiled: &Compiled<'_>) -> Vec<(String, f64)> {
     let limiting = compiled.trajectory.limiting();
     let mut by =
-        vec![("the pen's speed".to_owned(), limiting.pen), ("rows in turns".to_owned(), limiting.rows)];
+        vec![("the pen's speed".to_owned(), limiting.pen_s), ("rows in turns".to_owned(), limiting.rows_s)];
     for (k, motor) in compiled.header.motors.iter().enumerate() {
-        by.push((format!("speed of {}", motor.name), limiting.speed[k]));
-        by.push((format!("acceleration of {}", motor.name), limiting.acceleration[k]));
-        by.push((format!("jerk of {}", motor.name), limiting.jerk[k]));
-        by.push((format!("acceleration of {} in corners and curves", motor.name), limiting.turning[k]));
+        by.push((format!("speed of {}", motor.name), limiting.speed_s[k]));
+        by.push((format!("acceleration of {}", motor.name), limiting.acceleration_s[k]));
+        by.push((format!("jerk of {}", motor.name), limiting.jerk_s[k]));
+        by.push((format!("acceleration of {} in corners and curves", motor.name), limiting.turning_s[k]));
     }
     by.retain(|(_, time)| *time > 0.0);
     by.sort_by(|a, b| b.1.total_cmp(&a.1));

@@ -5,10 +5,9 @@ use std::path::Path;
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::joint_path::{GridInterval, PathGeometry};
-use planner::path::{PathBudget, CornerBlend, Section, sections};
-use planner::time_parametrization::{SpeedCap, profile};
-use planner::{JointPath, Settings, plan};
+use planner::unstable::{CornerBlend, PathBudget, Section, sections};
+use planner::unstable::{GridInterval, JointPath, PathGeometry, SpeedCap, profile};
+use planner::{Settings, plan};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -107,8 +106,13 @@ fn corner() -> String {
     let points = [(0.0, 0.0), (1.35, 0.0), (1.35, 0.9), (2.75, 1.25)].map(Point::from);
     let stroke = polyline(&points);
     let deviation = 0.1;
-    let budget =
-        PathBudget { chord: 0.01, simplify: 0.0, blend: deviation, corner: CornerBlend::Parabola, row: f64::INFINITY };
+    let budget = PathBudget {
+        chord_mm: 0.01,
+        simplify_mm: 0.0,
+        blend_mm: deviation,
+        corner: CornerBlend::Parabola,
+        row_mm: f64::INFINITY,
+    };
     let mut picture = Picture::new(Rect::new(20.0, 20.0, 620.0, 340.0), Rect::new(-0.1, -0.2, 2.9, 1.4));
     // Everything within the tolerance, as one broad line with round joints.
     let broad = 2.0 * deviation * 200.0;
@@ -140,9 +144,15 @@ fn speed() -> Result<String, Failure> {
         polyline(&[(50.0, 50.0), (56.0, 50.0), (56.0, 54.0), (59.0, 51.0), (62.0, 51.0)].map(Point::from));
     let down = -std::f64::consts::FRAC_PI_2;
     stroke.arc(EllipticArc::circular(Point::new(62.0, 53.5), 2.5, down, std::f64::consts::PI));
-    let budget =
-        PathBudget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Parabola, row: f64::INFINITY };
-    let cap = SpeedCap { pen: machine.pen().max_speed_mm_s, row_deviation: f64::INFINITY, period: 1e-3 };
+    let budget = PathBudget {
+        chord_mm: 0.01,
+        simplify_mm: 0.0,
+        blend_mm: 0.05,
+        corner: CornerBlend::Parabola,
+        row_mm: f64::INFINITY,
+    };
+    let cap =
+        SpeedCap { pen_mm_s: machine.pen().max_speed_mm_s, row_deviation_mm: f64::INFINITY, period_s: 1e-3 };
     let (mut limit, mut driven) = (Vec::new(), Vec::new());
     let mut way = 0.0;
     for section in sections(&stroke, &budget) {
@@ -156,13 +166,14 @@ fn speed() -> Result<String, Failure> {
                 let pen = pen_speed(section, interval.piece, interval.start + share * interval.length);
                 limit.push((at + share * pen * interval.length, pen * most(&machine, interval, j)));
             }
-            at += interval.length * pen_speed(section, interval.piece, interval.start + 0.5 * interval.length);
+            at +=
+                interval.length * pen_speed(section, interval.piece, interval.start + 0.5 * interval.length);
         }
         for phase in profile(&machine, &path, &cap).phases {
             let mut from = way;
             let mut last = phase.start;
             for k in 0..=8 {
-                let t = phase.duration * f64::from(k) / 8.0;
+                let t = phase.duration_s * f64::from(k) / 8.0;
                 let s = phase.start + t * (phase.speed + 0.5 * phase.acceleration * t);
                 from += (s - last) * pen_speed(section, phase.piece, 0.5 * (s + last));
                 last = s;

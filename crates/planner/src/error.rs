@@ -6,31 +6,32 @@ use kinematics::OutOfReach;
 /// Why a drawing cannot be planned on a machine.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// A stroke leaves what the machine can reach.
-    #[error("stroke {} (pen {}): {source}", stroke + 1, pen.0)]
+    /// A stroke leaves the machine's reach. The point and the reason are in the source, which the
+    /// message does not repeat.
+    #[error("stroke {} (pen {}) leaves the machine's reach", stroke + 1, pen.0)]
     OutOfReach {
         /// Index of the stroke in the drawing.
         stroke: usize,
-        /// Its pen.
+        /// The stroke's pen.
         pen: Pen,
-        /// Where the source says it.
+        /// Byte range of the stroke in the source file.
         span: Span,
         /// The point and the reason.
         source: OutOfReach,
     },
-    /// There is nothing to draw.
+    /// The drawing is empty.
     #[error("the drawing has no ink")]
     NoInk,
-    /// A setting makes no sense.
+    /// A setting is outside its valid range.
     #[error("{what}")]
     Setting {
-        /// What is wrong with which.
-        what: String,
+        /// The setting and its valid range.
+        what: &'static str,
     },
     /// No placement of the drawing fits the machine.
     #[error("the drawing cannot be placed: {why}")]
     NoPlacement {
-        /// Why not.
-        why: String,
+        /// The reason.
+        why: &'static str,
     },
 }

@@ -1,7 +1,7 @@
 //! Lifting the pen's path into joint space, adaptively, with what a time law must know.
 
 use drawing::{Point, Segment, Vec2};
-use kinematics::{Fault, Geometry, JointPos, Machine, MotorPos, OutOfReach};
+use kinematics::{Fault, Geometry, JointPos, Machine, MotorPos, OutOfReach, Unreachable};
 
 use crate::path::{Piece, Section};
 
@@ -134,7 +134,13 @@ impl JointPath {
 
 impl GridInterval {
     /// The interval, cut in two so many times over.
-    pub(crate) fn subdivide(&self, machine: &Machine, geometry: &PathGeometry, times: u32, to: &mut Vec<Self>) {
+    pub(crate) fn subdivide(
+        &self,
+        machine: &Machine,
+        geometry: &PathGeometry,
+        times: u32,
+        to: &mut Vec<Self>,
+    ) {
         match if times > 0 { self.halves(machine, geometry) } else { None } {
             Some(halves) => halves.iter().for_each(|half| half.subdivide(machine, geometry, times - 1, to)),
             None => to.push(*self),
@@ -163,7 +169,8 @@ impl GridInterval {
             (places.map(|place| place.0), places.map(|place| place.1))
         });
         // Of both halves, for where one of them has its second_derivative_bound change sign it shows none in its middle.
-        let midpoint_errors = parts.map(|(first, second)| midpoint_error(machine, self.pen_speed, &first, &second));
+        let midpoint_errors =
+            parts.map(|(first, second)| midpoint_error(machine, self.pen_speed, &first, &second));
         let interpolation_error = 0.5 * midpoint_errors[0].max(midpoint_errors[1]);
         let half = |which: usize| {
             let (first, second) = parts[which];
@@ -188,20 +195,19 @@ impl GridInterval {
 
 impl PathGeometry {
     /// The joints at `s` on a piece, exactly on the path; angles are unwrapped to the turn nearest to `near`.
-    pub fn pose(&self, machine: &Machine, piece: usize, s: f64, near: &JointPos) -> JointPos {
+    pub fn pose(
+        &self,
+        machine: &Machine,
+        piece: usize,
+        s: f64,
+        near: &JointPos,
+    ) -> Result<JointPos, Unreachable> {
         match self {
-            Self::Travel(from, to) => {
-                if s >= 1.0 {
-                    *to
-                } else {
-                    *from + s * (*to - *from)
-                }
-            }
+            Self::Travel(from, to) => Ok(if s >= 1.0 { *to } else { *from + s * (*to - *from) }),
             Self::Drawn(_, pieces) => {
                 let piece = &pieces[piece];
                 let point = piece.curve.eval((s * piece.rate).min(1.0));
-                // Reach was checked for the whole piece when it was lifted.
-                machine.pose_near(point, near).unwrap_or(*near)
+                machine.pose_near(point, near)
             }
         }
     }
@@ -251,7 +257,13 @@ impl Builder<'_> {
     }
 
     /// Adds the intervals between two samples, bisecting as long as one interval would not do.
-    fn add_interval(&mut self, index: usize, piece: &Piece, from: Sample, to: Sample) -> Result<(), OutOfReach> {
+    fn add_interval(
+        &mut self,
+        index: usize,
+        piece: &Piece,
+        from: Sample,
+        to: Sample,
+    ) -> Result<(), OutOfReach> {
         // An explicit stack keeps the order and bounds the memory.
         let mut pending = vec![(from, to)];
         while let Some((a, b)) = pending.pop() {
@@ -259,8 +271,16 @@ impl Builder<'_> {
             let length = b.s - a.s;
             let first = [a.derivatives.first, middle.derivatives.first, b.derivatives.first];
             let second = [a.derivatives.second, middle.derivatives.second, b.derivatives.second];
-            let midpoint_error = midpoint_error(self.machine, a.derivatives.pen_speed.max(b.derivatives.pen_speed), &first, &second);
-            if length > SHORTEST && (midpoint_error > LARGEST_MIDPOINT_ERROR || !self.is_within_limits(length, &a, &middle, &b)) {
+            let midpoint_error = midpoint_error(
+                self.machine,
+                a.derivatives.pen_speed.max(b.derivatives.pen_speed),
+                &first,
+                &second,
+            );
+            if length > SHORTEST
+                && (midpoint_error > LARGEST_MIDPOINT_ERROR
+                    || !self.is_within_limits(length, &a, &middle, &b))
+            {
                 pending.push((middle, b));
                 pending.push((a, middle));
                 continue;
@@ -274,7 +294,8 @@ impl Builder<'_> {
                 });
             }
             let samples = [&a.derivatives, &middle.derivatives, &b.derivatives];
-            let most = |of: fn(&PathDerivatives) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
+            let most =
+                |of: fn(&PathDerivatives) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
             self.intervals.push(GridInterval {
                 length,
                 piece: index,
@@ -291,7 +312,13 @@ impl Builder<'_> {
     }
 
     /// By how much the derivatives leave the straight lines between the three samples, looked at half way.
-    fn interpolation_error(&self, piece: &Piece, a: &Sample, middle: &Sample, b: &Sample) -> Result<f64, OutOfReach> {
+    fn interpolation_error(
+        &self,
+        piece: &Piece,
+        a: &Sample,
+        middle: &Sample,
+        b: &Sample,
+    ) -> Result<f64, OutOfReach> {
         let even = matches!(self.machine.geometry(), Geometry::Cartesian(_));
         if even && piece.curve.third_derivative(0.0) == Vec2::ZERO {
             return Ok(0.0);
@@ -301,8 +328,12 @@ impl Builder<'_> {
             let half_way = self.sample(piece, 0.5 * (from.s + to.s), from.pose)?.derivatives;
             let first = [from.derivatives.first, half_way.first, to.derivatives.first];
             let second = [from.derivatives.second, half_way.second, to.derivatives.second];
-            interpolation_error =
-                interpolation_error.max(midpoint_error(self.machine, from.derivatives.pen_speed.max(to.derivatives.pen_speed), &first, &second));
+            interpolation_error = interpolation_error.max(midpoint_error(
+                self.machine,
+                from.derivatives.pen_speed.max(to.derivatives.pen_speed),
+                &first,
+                &second,
+            ));
         }
         Ok(1.2 * interpolation_error)
     }
@@ -316,7 +347,11 @@ impl Builder<'_> {
 
     /// Whether the interval is short enough for linear joint motion.
     fn is_within_limits(&self, length: f64, a: &Sample, middle: &Sample, b: &Sample) -> bool {
-        let turning = a.derivatives.normal_second_derivative.max(middle.derivatives.normal_second_derivative).max(b.derivatives.normal_second_derivative);
+        let turning = a
+            .derivatives
+            .normal_second_derivative
+            .max(middle.derivatives.normal_second_derivative)
+            .max(b.derivatives.normal_second_derivative);
         let deviation = (self.machine.geometry().second_derivative_bound(&a.pose, &b.pose)
             + length * length * turning)
             / 8.0;

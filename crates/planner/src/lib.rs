@@ -1,32 +1,84 @@
-//! From strokes to motor ticks against time.
+//! Plans the motion of a drawing machine: from strokes to motor ticks against time.
 //!
 //! ```text
-//! Stroke --path--> smooth sections (mm) --lift--> joint path --time_law--> profile --trajectory--> rows of ticks
+//! Stroke --path--> smooth sections (mm) --joint_path--> joint path --time_parametrization-->
+//!     velocity profile --trajectory--> rows of ticks
 //! ```
-//! 1. [`path`]: a stroke becomes smooth **sections**: fewer pieces within the tolerance, corners as parabolas. The pen rests
-//!    only where it turns back.
-//! 2. [`joint_path`]: a section is lifted into joint space as a [`JointPath`]: **cells** with the motors' first and second
-//!    derivatives along it at start, middle and end, and how much rows bend against it.
-//! 3. [`time_parametrization`]: along a joint path, the fastest speed profile that the motors and the rows allow, from rest to rest.
-//! 4. `stroke`: the three for one stroke, from one of the poses in which the machine can begin it.
-//! 5. [`trajectory`]: strokes, travel in joint space, pen lifts and drops one after the other, sampled at a fixed
-//!    period into rows whose ticks are rounded from exact positions, so that nothing drifts.
+//! 1. `path`: a stroke becomes smooth **sections**: redundant vertices are removed within the
+//!    tolerance, corners are blended with parabolas, or with cubic splines where jerk is limited.
+//!    The pen stops only at reversals.
+//! 2. `joint_path`: inverse kinematics along a section gives a joint path, divided into **grid
+//!    intervals** with the motors' first and second derivatives at start, middle and end, and a
+//!    bound on how far linear motion between rows leaves the path.
+//! 3. `time_parametrization`: the fastest velocity profile along a joint path, from rest to rest,
+//!    under the limits of the motors, of the pen and of linear motion between rows.
+//! 4. `stroke`: steps 1 to 3 for one stroke, from one of the poses in which the machine can begin.
+//! 5. `trajectory`: strokes, travel in joint space, pen lifts and drops in sequence, sampled at a
+//!    fixed period. Ticks are rounded from exact positions, so rounding errors do not accumulate.
 //!
-//! Drawings come in machine mm (see [`placement`]). Nothing here knows HPGL, formats or files.
+//! [`plan`] expects a drawing in machine mm; [`placement`] maps drawing mm to machine mm. This crate
+//! knows neither HPGL nor output formats nor files.
+//!
+//! # Example
+//! From a machine and a line to rows of ticks, and a line out of reach:
+//! ```
+//! use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
+//! use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits};
+//! use planner::{PlanError, Settings, plan};
+//!
+//! let axis = |name: &str| Motor {
+//!     name: name.into(), ticks_per_unit: 80.0, offset_ticks: 0.0,
+//!     max_speed_ticks_s: 8000.0, max_acceleration_ticks_s2: 80_000.0, max_jerk_ticks_s3: None,
+//! };
+//! let machine = Machine::new(MachineParts {
+//!     name: "table".into(), geometry: Geometry::Cartesian(Cartesian),
+//!     joints: [Joint { min: 0.0, max: 300.0 }; 2], min_manipulability: 0.0,
+//!     coupling: [[1.0, 0.0], [0.0, 1.0]], motors: [axis("x"), axis("y")],
+//!     pen: PenLimits {
+//!         max_speed_mm_s: 100.0, max_travel_speed_mm_s: 100.0, lift_time_s: 0.1, drop_time_s: 0.1,
+//!     },
+//!     sheet: Rect::new(0.0, 0.0, 300.0, 300.0), start: JointPos::ZERO, period_s: 0.01,
+//! })?;
+//! let line = |to: Point| -> Option<Drawing> {
+//!     let points = vec![Point::new(10.0, 10.0), to];
+//!     Some(Drawing { strokes: vec![Stroke::polyline(Pen(1), points, Span::default())?] })
+//! };
+//! let settings = Settings::new(0.1, 10_000);
+//!
+//! let drawing = line(Point::new(60.0, 10.0)).expect("two points");
+//! let trajectory = plan(&machine, drawing, &settings)?;
+//! let highest = trajectory.rows().map(|row| row.row.ticks[0]).max();
+//! assert_eq!(highest, Some(60 * 80));
+//! assert_eq!(trajectory.rows().last().map(|row| row.row.ticks), Some([0, 0]));
+//!
+//! let drawing = line(Point::new(301.0, 10.0)).expect("two points");
+//! let error = plan(&machine, drawing, &settings).expect_err("x goes to 300 mm");
+//! assert!(matches!(error, PlanError::OutOfReach { stroke: 0, .. }));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
-pub mod joint_path;
-pub mod path;
+mod joint_path;
+mod path;
 pub mod placement;
-pub mod settings;
+mod settings;
 mod stroke;
-pub mod time_parametrization;
-pub mod trajectory;
+mod time_parametrization;
+mod trajectory;
 mod travel;
 
 pub use error::PlanError;
-pub use joint_path::JointPath;
-pub use settings::{Law, Settings};
+pub use placement::{PlacementOptions, Scale, place};
+pub use settings::{Settings, TimingLaw};
 pub use time_parametrization::{Easing, LimitingConstraints};
-pub use trajectory::{ExactRow, Times, Trajectory, check_reach, plan};
+pub use trajectory::{ExactRow, Rows, Times, Trajectory, check_reach, plan};
 pub use travel::{travel_pose, travel_time};
+
+/// The planner's stages one by one, for benchmarks, reference tests and pictures. No stability is
+/// promised: these items change whenever the planner does.
+#[cfg(feature = "unstable")]
+pub mod unstable {
+    pub use crate::joint_path::{GridInterval, JointPath, PathGeometry};
+    pub use crate::path::{CornerBlend, PathBudget, Piece, Section, sections};
+    pub use crate::time_parametrization::{Phase, Profile, SpeedCap, profile, profile_without_refinement};
+}

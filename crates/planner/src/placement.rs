@@ -1,69 +1,76 @@
-//! Where a drawing lies on the machine.
+//! Placement of a drawing on the machine.
 
 use drawing::{Affine, Drawing, Point, Rect, Segment, Vec2};
 use kinematics::Machine;
 
-use crate::PlanError;
+use crate::error::PlanError;
 
-/// What was asked for.
+/// Where and how large to place a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacementOptions {
-    /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding box stays in place.
+    /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding box
+    /// stays in place.
     pub rotate_rad: f64,
-    /// How large and where.
+    /// Size and position.
     pub scale: Scale,
 }
 
-/// How large a drawing becomes and where its origin goes.
+/// The size of the placed drawing and the position of its origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
-    /// Scaled by a factor about the drawing's origin, which goes to `origin`, in mm from the sheet's lower-left corner.
+    /// Scaled by a factor about the drawing's origin, which is then moved to `origin_mm`.
     Explicit {
-        /// The factor; 1 is life-size.
-        scale: f64,
-        /// Where the drawing's (0, 0) goes.
-        origin: Vec2,
+        /// The factor; 1 keeps the drawing's size.
+        factor: f64,
+        /// Position of the drawing's (0, 0), in mm from the sheet's lower-left corner.
+        origin_mm: Vec2,
     },
-    /// As large as the sheet and the machine's reach allow, as near to the middle of the sheet as that leaves.
+    /// As large as the sheet and the machine's reach allow, as close to the sheet's center as
+    /// possible at that size.
     Fit,
 }
 
 impl Default for PlacementOptions {
-    /// Life-size, the drawing's origin at the sheet's lower-left corner.
+    /// Actual size, with the drawing's origin at the sheet's lower-left corner.
     fn default() -> Self {
-        Self { rotate_rad: 0.0, scale: Scale::Explicit { factor: 1.0, origin: Vec2::ZERO } }
+        Self { rotate_rad: 0.0, scale: Scale::Explicit { factor: 1.0, origin_mm: Vec2::ZERO } }
     }
 }
 
-/// The map from drawing mm to machine mm that the options asks for.
+/// The map from drawing mm to machine mm.
+///
+/// An explicit placement is not checked against the sheet and the reach; see
+/// [`crate::check_reach`] and [`beyond_sheet_mm`].
 ///
 /// # Errors
-/// When a number is not finite, the scale not positive, or nothing fits.
+/// [`PlanError::NoInk`] for an empty drawing, [`PlanError::Setting`] if a number is not finite or
+/// the scale is not positive, [`PlanError::NoPlacement`] if no size fits.
 pub fn place(machine: &Machine, drawing: &Drawing, options: &PlacementOptions) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
-    let setting = |what: &str| PlanError::Setting { what: what.into() };
+    let setting = |what: &'static str| PlanError::Setting { what };
     if !options.rotate_rad.is_finite() {
         return Err(setting("the rotation must be a finite angle"));
     }
-    let turned = rotation_about_corner(drawing, bounds, options.rotate_rad);
+    let rotation = rotation_about_corner(drawing, bounds, options.rotate_rad);
     match options.scale {
         Scale::Explicit { factor, origin_mm } => {
-            if !(scale > 0.0 && scale.is_finite() && origin.is_finite()) {
+            if !(factor > 0.0 && factor.is_finite() && origin_mm.is_finite()) {
                 return Err(setting("the scale must be a positive number and the place finite"));
             }
             let sheet = machine.sheet();
-            let corner = Vec2::new(sheet.x0, sheet.y0) + origin;
-            Ok(Affine::translate(corner) * Affine::scale(scale) * turned)
+            let corner = Vec2::new(sheet.x0, sheet.y0) + origin_mm;
+            Ok(Affine::translate(corner) * Affine::scale(factor) * rotation)
         }
         Scale::Fit => {
-            let mut turned_drawing = drawing.clone();
-            turned_drawing.transform(turned);
-            Ok(fit(machine, &turned_drawing)? * turned)
+            let mut rotated = drawing.clone();
+            rotated.transform(rotation);
+            Ok(fit(machine, &rotated)? * rotation)
         }
     }
 }
 
-/// Rotation after which the lower-left corner of the ink's bounding box is where it was. Quarter turns are exact.
+/// The rotation that keeps the lower-left corner of the ink's bounding box in place. Multiples of 90
+/// degrees are exact.
 fn rotation_about_corner(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine {
     if angle == 0.0 {
         return Affine::IDENTITY;
@@ -81,20 +88,21 @@ fn rotation_about_corner(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine 
     Affine::translate((bounds.x0 - after.x0, bounds.y0 - after.y0)) * rotation
 }
 
-/// How many points of the ink decide where it fits, at most, before the whole of it is checked.
-const SAMPLES_A_SIDE: f64 = 250.0;
-/// Translations tried to either side of the middle along each axis.
+/// Resolution of the ink's sample, in cells along the longer side of its bounding box.
+const SAMPLES_PER_SIDE: f64 = 250.0;
+/// Number of translations tried on either side of the center along each axis.
 const GRID: i32 = 24;
-/// The scale is found to this share of itself.
+/// Relative precision of the scale.
 const PRECISION: f64 = 1e-4;
 
 /// The largest scale, with its translation, at which all ink lies on the sheet and within reach.
 ///
-/// Reach need not be convex (the half ring of a polar machine has a hole that a drawing may lie around), so this is a
-/// search: bisection over the scale, and for each scale a grid of translations from the middle outwards, refined around
-/// the best. Only a sample of the ink is looked at; the exact check of every segment then either accepts the placement
-/// or gives an offending point, which joins the sample, and the search goes on from there. Deterministic: no clock, no
-/// chance, ties by the order of the grid.
+/// The set of placements that fit need not be convex (the half ring of a polar machine has a hole
+/// that a drawing may enclose), so this is a search: bisection over the scale, and for each scale a
+/// grid of translations from the center outwards, refined around the best. The search looks at a
+/// sample of the ink. The exact check of every segment then either accepts the placement or returns a
+/// violating point, which is added to the sample, and the search continues. Deterministic: ties are
+/// broken by the order of the grid.
 fn fit(machine: &Machine, drawing: &Drawing) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
     let sheet = machine.sheet();
@@ -102,36 +110,35 @@ fn fit(machine: &Machine, drawing: &Drawing) -> Result<Affine, PlanError> {
     let across = if bounds.width() > 0.0 { sheet.width() / bounds.width() } else { f64::INFINITY };
     let up = if bounds.height() > 0.0 { sheet.height() / bounds.height() } else { f64::INFINITY };
     let largest = across.min(up);
-    // A single dot has no size: it stays as it is.
+    // A single dot has no extent: it keeps its scale.
     let largest = if largest.is_finite() { largest } else { 1.0 };
     let mut high = largest;
     for round in 0..200 {
         let Some((scale, shift)) = search.largest(high) else { break };
         let placement = Affine::translate(shift) * Affine::scale(scale);
-        match first_fault(machine, sheet, drawing, placement) {
+        match first_violation(machine, sheet, drawing, placement) {
             None => return Ok(placement),
             Some(offending) => {
                 search.points.insert(0, placement.inverse() * offending);
-                // Points that the sample missed can only make it smaller: by a hair at first, ever more if that does not end.
+                // More points only reduce the scale: by 1e-5 at first, by more in each later round.
                 high = scale * (1.0 - 1e-5 * f64::from(round));
             }
         }
     }
-    Err(PlanError::NoPlacement {
-        why: "no size of it lies on the sheet and within the machine's reach".into(),
-    })
+    Err(PlanError::NoPlacement { why: "no size of it lies on the sheet and within the machine's reach" })
 }
 
 struct Search<'a> {
     machine: &'a Machine,
     sheet: Rect,
     bounds: Rect,
-    /// Those that ruled out a translation move to the front, so that most are ruled out at once.
+    /// The sample. A point that rules out a translation moves to the front, since it is likely to rule
+    /// out the next one.
     points: Vec<Point>,
 }
 
 impl Search<'_> {
-    /// The largest scale up to `high` at which the sample fits, with a translation.
+    /// The largest scale up to `high` at which the sample fits, with its translation.
     fn largest(&mut self, high: f64) -> Option<(f64, Vec2)> {
         if let Some(shift) = self.translation(high) {
             return Some((high, shift));
@@ -150,17 +157,17 @@ impl Search<'_> {
         best.map(|(scale, shift)| self.refine(scale, shift))
     }
 
-    /// Grows a placement that fits by trying nearby ones, in ever smaller steps.
+    /// Enlarges a placement that fits by trying nearby translations, with decreasing steps.
     fn refine(&mut self, scale: f64, shift: Vec2) -> (f64, Vec2) {
         let (mut scale, mut shift) = (scale, shift);
         let middle = self.bounds.center().to_vec2();
         let mut growth = 0.02;
         while growth > 0.1 * PRECISION {
             let larger = scale * (1.0 + growth);
-            // Growing about the drawing's middle, moved by up to what the growth amounts to.
+            // Enlarged about the drawing's center, and moved by at most half the growth.
             let about = shift + (scale - larger) * middle;
             let reach = 0.5 * growth * scale * self.bounds.width().max(self.bounds.height());
-            let moved = from_the_middle(6).into_iter().map(|(x, y)| about + reach * Vec2::new(x, y));
+            let moved = from_center(6).into_iter().map(|(x, y)| about + reach * Vec2::new(x, y));
             match moved.into_iter().find(|shift| self.fits(larger, *shift)) {
                 Some(found) => (scale, shift) = (larger, found),
                 None => growth *= 0.5,
@@ -169,15 +176,16 @@ impl Search<'_> {
         (scale, shift)
     }
 
-    /// A translation that puts the scaled sample on the sheet and within reach, as near to the middle as the grid has one.
+    /// The translation nearest to the center, on the grid, that puts the scaled sample on the sheet and
+    /// within reach.
     fn translation(&mut self, scale: f64) -> Option<Vec2> {
         let (bounds, sheet) = (self.bounds, self.sheet);
         let low = Vec2::new(sheet.x0 - scale * bounds.x0, sheet.y0 - scale * bounds.y0);
         let high = Vec2::new(sheet.x1 - scale * bounds.x1, sheet.y1 - scale * bounds.y1);
-        let room = (high - low).max_zero();
+        let free = Vec2::new((high - low).x.max(0.0), (high - low).y.max(0.0));
         let middle = 0.5 * (low + high);
         let shifts =
-            from_the_middle(GRID).into_iter().map(|(x, y)| middle + 0.5 * Vec2::new(room.x * x, room.y * y));
+            from_center(GRID).into_iter().map(|(x, y)| middle + 0.5 * Vec2::new(free.x * x, free.y * y));
         shifts.into_iter().find(|shift| self.fits(scale, *shift))
     }
 
@@ -194,18 +202,9 @@ impl Search<'_> {
     }
 }
 
-trait MaxZero {
-    fn max_zero(self) -> Self;
-}
-
-impl MaxZero for Vec2 {
-    fn max_zero(self) -> Self {
-        Self::new(self.x.max(0.0), self.y.max(0.0))
-    }
-}
-
-/// The points of a grid over the square from -1 to 1, `2 half + 1` a side, by their distance from the middle.
-fn from_the_middle(half: i32) -> Vec<(f64, f64)> {
+/// The points of a grid over the square from -1 to 1, `2 half + 1` per side, sorted by their distance
+/// from the center.
+fn from_center(half: i32) -> Vec<(f64, f64)> {
     let mut cells: Vec<(i32, i32)> =
         (-half..=half).flat_map(|y| (-half..=half).map(move |x| (x, y))).collect();
     cells.sort_by_key(|(x, y)| (x * x + y * y, *y, *x));
@@ -218,9 +217,10 @@ fn on_sheet(sheet: Rect, p: Point) -> bool {
     p.x >= sheet.x0 - slack && p.x <= sheet.x1 + slack && p.y >= sheet.y0 - slack && p.y <= sheet.y1 + slack
 }
 
-/// Points of the ink, one for every cell of a grid over its bounding box that it passes through, and its extremes.
+/// Points of the ink: one for every cell of a grid over its bounding box that the ink passes through,
+/// and its extreme points.
 fn sample(drawing: &Drawing, bounds: Rect) -> Vec<Point> {
-    let side = bounds.width().max(bounds.height()) / SAMPLES_A_SIDE;
+    let side = bounds.width().max(bounds.height()) / SAMPLES_PER_SIDE;
     let mut taken = std::collections::BTreeSet::new();
     let mut points = Vec::new();
     let mut add = |p: Point| {
@@ -247,16 +247,16 @@ fn sample(drawing: &Drawing, bounds: Rect) -> Vec<Point> {
 }
 
 /// The first point of the placed drawing that is off the sheet or out of reach, machine mm.
-fn first_fault(machine: &Machine, sheet: Rect, drawing: &Drawing, placement: Affine) -> Option<Point> {
+fn first_violation(machine: &Machine, sheet: Rect, drawing: &Drawing, placement: Affine) -> Option<Point> {
     let fault = |segment: &Segment| {
-        let mut off = None;
-        // The sheet is convex: for a straight piece its end tells.
+        let mut outside = None;
+        // The sheet is convex, so for a line its end is sufficient.
         segment.flatten(1e-3, |point| {
-            if off.is_none() && !on_sheet(sheet, point) {
-                off = Some(point);
+            if outside.is_none() && !on_sheet(sheet, point) {
+                outside = Some(point);
             }
         });
-        off.or_else(|| machine.check_segment(segment).err().map(|out| out.point))
+        outside.or_else(|| machine.check_segment(segment).err().map(|out| out.point))
     };
     drawing.strokes.iter().find_map(|stroke| {
         let start = placement * stroke.start();
@@ -265,8 +265,9 @@ fn first_fault(machine: &Machine, sheet: Rect, drawing: &Drawing, placement: Aff
     })
 }
 
-/// How far ink reaches beyond the sheet, mm; 0 when all of it lies on the sheet. `placed` is in machine mm.
-pub fn beyond_sheet(machine: &Machine, placed: &Drawing) -> f64 {
+/// The largest distance of ink outside the sheet, mm; 0 if all of it lies on the sheet. `placed` is
+/// in machine mm.
+pub fn beyond_sheet_mm(machine: &Machine, placed: &Drawing) -> f64 {
     let sheet = machine.sheet();
     placed.bounding_box().map_or(0.0, |ink| {
         [sheet.x0 - ink.x0, ink.x1 - sheet.x1, sheet.y0 - ink.y0, ink.y1 - sheet.y1]

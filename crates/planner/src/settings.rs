@@ -1,64 +1,62 @@
-//! How a plan is to be made, and how its tolerance is shared out.
+//! Planning settings, and how the tolerance is divided between the causes of deviation.
 
 use drawing::{Pen, Point};
 use kinematics::{JointPos, Machine, MotorPos};
 
 use crate::{
-    PlanError,
-    path::{PathBudget, CornerBlend},
+    error::PlanError,
+    path::{CornerBlend, PathBudget},
     time_parametrization::Easing,
 };
 
-/// How a plan is made.
+/// Planning settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Largest distance between the drawing's ink and the pen's continuous path, both ways, mm.
-    pub tolerance: f64,
+    /// Largest distance between the drawing's ink and the pen's continuous path, in both directions,
+    /// mm.
+    pub tolerance_mm: f64,
     /// Time between rows, microseconds.
     pub period_us: u64,
-    /// Where the plan ends, pen up and at rest; the machine's start pose if nothing is said.
-    pub park: Option<JointPos>,
-    /// Speeds of single pens, mm/s, where they are to be slower than the machine's pen may be.
-    pub pen_speeds: Vec<(Pen, f64)>,
-    /// For how much of the time that a lift takes the motors may already travel, s.
-    pub lift_overlap: f64,
-    /// How the pen speeds up and slows down over the paper. Travel is always as fast as the motors can.
-    pub law: Law,
+    /// Speeds of single pens, mm/s, where they are lower than the machine's limit.
+    pub pen_speeds_mm_s: Vec<(Pen, f64)>,
+    /// How much of the time that a pen lift takes overlaps with the travel after it, s.
+    pub lift_overlap_s: f64,
+    /// The timing law along strokes. Travel is always time-optimal.
+    pub timing_law: TimingLaw,
 }
 
-/// How speed goes along the strokes.
+/// The timing law along strokes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Law {
-    /// As fast as the motors can, corners rounded within the tolerance.
+pub enum TimingLaw {
+    /// Time-optimal under the motors' limits, with corners blended within the tolerance.
     #[default]
     TimeOptimal,
-    /// As fast as the motors can from vertex to vertex, with a rest at each.
+    /// Time-optimal from vertex to vertex, with a stop at each vertex.
     Trapezoid,
-    /// The same time for every piece between two vertices, whatever the motors can.
+    /// The same duration for every piece between two vertices, whatever the motors' limits are.
     FixedDuration {
-        /// How the way goes with time.
+        /// Position along the piece against time.
         easing: Easing,
-        /// The time, s; rounded to whole periods, one at least.
+        /// The duration, s; rounded to whole periods, at least one.
         segment_time_s: f64,
     },
 }
 
 impl Settings {
-    /// Time-optimal, parked at the start pose, all pens as fast as the machine's pen may be.
-    pub fn new(tolerance: f64, period_us: u64) -> Self {
+    /// Time-optimal motion without lift overlap, every pen at the machine's limit.
+    pub fn new(tolerance_mm: f64, period_us: u64) -> Self {
         Self {
-            tolerance,
+            tolerance_mm,
             period_us,
-            park: None,
-            pen_speeds: Vec::new(),
-            lift_overlap: 0.0,
-            law: Law::TimeOptimal,
+            pen_speeds_mm_s: Vec::new(),
+            lift_overlap_s: 0.0,
+            timing_law: TimingLaw::TimeOptimal,
         }
     }
 
-    /// How fast a pen may go over the paper, mm/s.
+    /// The speed limit of a pen over the paper, mm/s.
     pub(crate) fn speed_of(&self, machine: &Machine, pen: Pen) -> f64 {
-        let own = self.pen_speeds.iter().filter(|(which, _)| *which == pen).map(|(_, speed)| *speed);
+        let own = self.pen_speeds_mm_s.iter().filter(|(which, _)| *which == pen).map(|(_, speed)| *speed);
         own.fold(machine.pen().max_speed_mm_s, f64::min)
     }
 }
@@ -66,24 +64,26 @@ impl Settings {
 /// The largest share of the tolerance that linear motion between rows may use.
 const ROW_SHARE: f64 = 0.4;
 
-/// The share of the tolerance within which straight pieces may stand for several, where there are corners to blend.
+/// The share of the path's tolerance for removing vertices; the rest is for blending corners.
 const SIMPLIFY_SHARE: f64 = 0.3;
 
-/// The share that is kept for what the bounds leave out.
+/// The share kept in reserve for what the bounds do not cover.
 const RESERVE: f64 = 0.02;
 
-/// How the tolerance is shared out, mm.
+/// How the tolerance is divided.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ToleranceBudget {
-    /// To linear motion between rows.
-    pub(crate) row: f64,
-    /// To the path itself.
+    /// For linear motion between rows, mm.
+    pub(crate) row_mm: f64,
+    /// For the path itself.
     pub(crate) path: PathBudget,
 }
 
 impl ToleranceBudget {
-    /// Rows need no more than the largest acceleration can bend the pen's way over a period: by `T² A / 8`. What is
-    /// left goes to the corners.
+    /// Linear motion over a period `T` deviates by at most `T² A / 8`, where `A` is the largest
+    /// acceleration of the pen that the motors can produce, sampled at the sheet's center and
+    /// corners. Rows get 1.5 times that, at most [`ROW_SHARE`] of the tolerance; the path gets the
+    /// rest.
     pub(crate) fn of(machine: &Machine, settings: &Settings) -> Self {
         let period = settings.period_us as f64 * 1e-6;
         let sheet = machine.sheet();
@@ -103,36 +103,44 @@ impl ToleranceBudget {
         };
         let poses = places.iter().filter_map(|place| machine.pose_near(*place, &machine.start()).ok());
         let acceleration = poses.map(|pose| pen_acceleration(&pose)).fold(0.0, f64::max);
-        let tolerance = (1.0 - RESERVE) * settings.tolerance;
+        let tolerance = (1.0 - RESERVE) * settings.tolerance_mm;
         let (needed, share) = (1.5 * period * period * acceleration / 8.0, ROW_SHARE * tolerance);
         let row = needed.min(share);
         let path = tolerance - row;
         let simplify = SIMPLIFY_SHARE * path;
-        let marked = if needed > share { row } else { f64::INFINITY };
+        let zone = if needed > share { row } else { f64::INFINITY };
         let jerk = machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some());
         let corner = if jerk { CornerBlend::Spline } else { CornerBlend::Parabola };
         Self {
-            row,
-            path: PathBudget { chord: 0.5 * path, simplify, blend: path - simplify, corner, row: marked },
+            row_mm: row,
+            path: PathBudget {
+                chord_mm: 0.5 * path,
+                simplify_mm: simplify,
+                blend_mm: path - simplify,
+                corner,
+                row_mm: zone,
+            },
         }
     }
 }
 
-/// Whether the settings make sense.
+/// Checks that every setting is in its valid range.
 pub(crate) fn check(settings: &Settings) -> Result<(), PlanError> {
-    let setting =
-        |holds: bool, what: &str| holds.then_some(()).ok_or(PlanError::Setting { what: what.into() });
-    setting(
-        settings.tolerance >= 1e-4 && settings.tolerance.is_finite(),
+    let require = |holds: bool, what: &'static str| holds.then_some(()).ok_or(PlanError::Setting { what });
+    require(
+        settings.tolerance_mm >= 1e-4 && settings.tolerance_mm.is_finite(),
         "the tolerance must be at least 0.0001 mm",
     )?;
-    setting((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")?;
-    let speeds = settings.pen_speeds.iter().all(|(_, speed)| *speed > 0.0 && speed.is_finite());
-    setting(speeds, "a pen's speed must be a positive number of mm/s")?;
-    setting(
-        (0.0..=3600.0).contains(&settings.lift_overlap),
+    require((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")?;
+    let speeds = settings.pen_speeds_mm_s.iter().all(|(_, speed)| *speed > 0.0 && speed.is_finite());
+    require(speeds, "a pen's speed must be a positive number of mm/s")?;
+    require(
+        (0.0..=3600.0).contains(&settings.lift_overlap_s),
         "the overlap of lifts must be between 0 and an hour",
     )?;
-    let Law::FixedDuration { segment_time_s, .. } = settings.law else { return Ok(()) };
-    setting((1e-6..=3600.0).contains(&segment_time_s), "the time of a segment must be between 1 us and an hour")
+    let TimingLaw::FixedDuration { segment_time_s, .. } = settings.timing_law else { return Ok(()) };
+    require(
+        (1e-6..=3600.0).contains(&segment_time_s),
+        "the time of a segment must be between 1 us and an hour",
+    )
 }

@@ -1,18 +1,18 @@
-//! One stroke: where the machine can draw it, and how it moves along it.
+//! Planning of one stroke: the pose it starts from, and the motion along it.
 
 use drawing::{Point, Stroke};
 use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
-    Settings,
-    joint_path::{PathGeometry, JointPath},
-    path::{PathBudget, Section, sections, vertex_to_vertex},
-    settings::{Law, ToleranceBudget},
+    joint_path::{JointPath, PathGeometry},
+    path::{PathBudget, Piece, Section, sections, vertex_to_vertex},
+    settings::{Settings, TimingLaw, ToleranceBudget},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile},
 };
 
-/// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops and pen events fall on
-/// rows: between rows motors move linearly, and a stop between two rows would be cut.
+/// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops
+/// and pen events coincide with rows: motors move linearly between rows, which would cut the corner
+/// at a stop between two rows.
 #[derive(Clone, Debug)]
 pub(crate) struct PathMotion {
     pub(crate) geometry: PathGeometry,
@@ -22,11 +22,11 @@ pub(crate) struct PathMotion {
     pub(crate) periods: u64,
 }
 
-/// A stroke as drawn from one of its poses.
+/// The motion along a stroke, from one of the poses it can start from.
 #[derive(Clone, Debug)]
 pub(crate) struct PlannedStroke {
     pub(crate) start: JointPos,
-    /// None for a dot.
+    /// Empty for a dot.
     pub(crate) motions: Vec<PathMotion>,
 }
 
@@ -36,7 +36,7 @@ impl PlannedStroke {
     }
 }
 
-/// What all strokes of a plan are planned with.
+/// What the strokes of a plan have in common.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrokePlanner<'a> {
     pub(crate) machine: &'a Machine,
@@ -45,19 +45,20 @@ pub(crate) struct StrokePlanner<'a> {
 }
 
 impl StrokePlanner<'_> {
-    /// Plans a stroke from the pose nearest to `near` from which all of it can be drawn: a stroke around the base may run
-    /// into a joint limit from one turn and not from another. `ready` is what was found for a pose before.
+    /// Plans a stroke from the first pose, in order of distance from `near`, from which all of it is
+    /// reachable: a stroke around the base may hit a joint limit from one turn but not from another.
+    /// `candidate` is the result for a predicted pose; it is used if the prediction was right.
     pub(crate) fn plan(
         &self,
         stroke: &Stroke,
         near: &JointPos,
-        ready: Option<Result<PlannedStroke, OutOfReach>>,
+        candidate: Option<Result<PlannedStroke, OutOfReach>>,
     ) -> Result<PlannedStroke, OutOfReach> {
         let start = stroke.start();
         self.machine.check_point(start)?;
         let poses = self.machine.poses(start, near).map_err(|fault| OutOfReach { point: start, fault })?;
         let mut first_error = None;
-        if let (Some(Ok(planned)), Some(pose)) = (ready, poses.first())
+        if let (Some(Ok(planned)), Some(pose)) = (candidate, poses.first())
             && planned.start == *pose
         {
             return Ok(planned);
@@ -73,7 +74,7 @@ impl StrokePlanner<'_> {
         Err(first_error.unwrap_or(OutOfReach { point: start, fault }))
     }
 
-    /// The pose near `near` in which a stroke would most likely begin, and one in which it would end.
+    /// Predicts the poses in which a stroke starts and ends if the machine arrives near `near`.
     pub(crate) fn predict_poses(&self, stroke: &Stroke, near: &JointPos) -> Option<(JointPos, JointPos)> {
         let pose = *self.machine.poses(stroke.start(), near).ok()?.first()?;
         let mut end = pose;
@@ -85,59 +86,70 @@ impl StrokePlanner<'_> {
 
     /// Plans a stroke from a pose.
     ///
-    /// Blends leave the drawing by as much as the tolerance allows. Where the drawing itself runs along the edge of the
-    /// reach they may leave that too: such a stroke is followed to the letter, with a rest at every corner.
+    /// Blends deviate from the drawing by up to the tolerance. Where the drawing follows the boundary
+    /// of the reach, a blend may leave the reach: such a stroke is planned again without blends, with
+    /// a stop at every corner.
     pub(crate) fn plan_from(&self, stroke: &Stroke, pose: JointPos) -> Result<PlannedStroke, OutOfReach> {
-        let exact = PathBudget { simplify: 0.0, blend: 0.0, ..self.budget.path };
-        match self.settings.law {
-            Law::TimeOptimal => {
-                let sections = |budget: &PathBudget| sections(stroke, budget);
-                self.plan_sections(stroke, pose, sections(&self.budget.path))
-                    .or_else(|_| self.plan_sections(stroke, pose, sections(&exact)))
+        let exact = PathBudget { simplify_mm: 0.0, blend_mm: 0.0, ..self.budget.path };
+        match self.settings.timing_law {
+            TimingLaw::TimeOptimal => self
+                .plan_sections(stroke, pose, sections(stroke, &self.budget.path))
+                .or_else(|_| self.plan_sections(stroke, pose, sections(stroke, &exact))),
+            TimingLaw::Trapezoid | TimingLaw::FixedDuration { .. } => {
+                self.plan_sections(stroke, pose, vertex_to_vertex(stroke, &exact))
             }
-            Law::Trapezoid | Law::FixedDuration { .. } => self.plan_sections(stroke, pose, vertex_to_vertex(stroke, &exact)),
         }
     }
 
-    fn plan_sections(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<PlannedStroke, OutOfReach> {
+    fn plan_sections(
+        &self,
+        stroke: &Stroke,
+        start: JointPos,
+        sections: Vec<Section>,
+    ) -> Result<PlannedStroke, OutOfReach> {
         let mut planned = PlannedStroke { start, motions: Vec::with_capacity(sections.len()) };
         let speed = self.settings.speed_of(self.machine, stroke.pen);
         for section in sections {
             let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
-            let path = JointPath::lift(self.machine, section, planned.end(), self.settings.tolerance)?;
+            let path =
+                JointPath::from_section(self.machine, section, planned.end(), self.settings.tolerance_mm)?;
             let end = self.end_pose(&path, end)?;
             planned.motions.push(self.parametrize(path, end, speed));
         }
         Ok(planned)
     }
 
-    /// The pose at the end of a drawn path, unwrapped along its intervals.
+    /// The pose at the end of a path, with angles unwrapped along its intervals.
     fn end_pose(&self, path: &JointPath, end: Point) -> Result<JointPos, OutOfReach> {
-        let along = path.intervals.iter().fold(path.geometry.start(), |near, interval| {
-            path.geometry.pose(self.machine, interval.piece, interval.start, &near)
-        });
-        let fault = |unreachable: Unreachable| OutOfReach { point: end, fault: unreachable.into() };
-        self.machine.pose_near(end, &along).map_err(fault)
+        let out_of_reach = |fault: Unreachable| OutOfReach { point: end, fault: fault.into() };
+        let mut near = path.geometry.start();
+        for interval in &path.intervals {
+            near = path
+                .geometry
+                .pose(self.machine, interval.piece, interval.start, &near)
+                .map_err(out_of_reach)?;
+        }
+        self.machine.pose_near(end, &near).map_err(out_of_reach)
     }
 
-    /// Lays the time law upon a path.
-    fn parametrize(&self, path: JointPath, end: JointPos, pen: f64) -> PathMotion {
+    /// Computes the velocity profile along a path.
+    fn parametrize(&self, path: JointPath, end: JointPos, pen_mm_s: f64) -> PathMotion {
         let period = self.period();
-        if let (Law::FixedDuration { easing, segment_time_s }, PathGeometry::Drawn(_, section)) =
-            (self.settings.law, &path.geometry)
+        if let (TimingLaw::FixedDuration { easing, segment_time_s }, PathGeometry::Drawn(_, section)) =
+            (self.settings.timing_law, &path.geometry)
         {
             let periods = (segment_time_s / period).round().max(1.0) as u64;
-            let length = section.iter().map(crate::path::Piece::length).sum();
+            let length = section.iter().map(Piece::length).sum();
             let profile = fixed_duration(easing, length, periods as f64 * period);
             return PathMotion { geometry: path.geometry, profile, end, periods };
         }
-        let cap = SpeedCap { pen, row_deviation: self.budget.row, period };
+        let cap = SpeedCap { pen_mm_s, row_deviation_mm: self.budget.row_mm, period_s: period };
         let profile = profile(self.machine, &path, &cap);
-        let periods = whole_periods(profile.duration, period).max(1);
+        let periods = whole_periods(profile.duration_s, period).max(1);
         PathMotion { geometry: path.geometry, profile, end, periods }
     }
 
-    /// The way with the pen up from pose to pose; nothing where there is none.
+    /// The motion with the pen up between two poses; `None` if they are equal.
     pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Option<PathMotion> {
         let path = JointPath::travel(self.machine, from, to)?;
         Some(self.parametrize(path, to, self.machine.pen().max_travel_speed_mm_s))
@@ -149,7 +161,8 @@ impl StrokePlanner<'_> {
     }
 }
 
-/// Whole periods that hold `duration`; a hair over a whole number is rounding, not another period.
+/// The number of periods that cover `duration`. An excess below 1e-9 periods is rounding error and
+/// does not add a period.
 pub(crate) fn whole_periods(duration: f64, period: f64) -> u64 {
     (duration / period - 1e-9).ceil().max(0.0) as u64
 }

@@ -1,8 +1,9 @@
-//! A whole plan: drawn sections, travel, pen lifts and drops one after the other, sampled into rows of ticks.
+//! A whole plan: strokes, travel, pen lifts and drops in sequence, sampled into rows of ticks.
 //!
-//! Strokes are planned a few thousand pieces at a time, on as many threads as there are, and forgotten when their rows are
-//! given: memory follows the longest stroke. A stroke depends on those before it only by the turn in which the machine
-//! arrives, so the rows are the same at any number of threads.
+//! Strokes are planned in batches of some thousand pieces, on all threads, and dropped once their
+//! rows are emitted: memory is proportional to the longest stroke. A stroke depends on its
+//! predecessors only through the turn about the base in which the machine arrives, so the rows do not
+//! depend on the number of threads.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -13,17 +14,18 @@ use plan::Row;
 use rayon::prelude::*;
 
 use crate::{
-    PlanError, Settings,
+    error::PlanError,
     joint_path::PathGeometry,
-    settings::{self, ToleranceBudget},
-    stroke::{PlannedStroke, PathMotion, StrokePlanner, whole_periods},
+    settings::{self, Settings, ToleranceBudget},
+    stroke::{PathMotion, PlannedStroke, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
 };
 
-/// How much geometry is planned at once, in curves of the drawing.
+/// The size of a batch, in segments of the drawing.
 const BATCH: usize = 4096;
 
-/// A plan whose motion has no more phases than this is cached, so that its rows can be had again without planning anew.
+/// A plan with at most this number of phases is cached, so that its rows can be generated again
+/// without planning again.
 const CACHED_PHASES: usize = 1 << 19;
 
 /// One step of a plan.
@@ -31,7 +33,7 @@ const CACHED_PHASES: usize = 1 << 19;
 enum Motion {
     /// Motion along a joint path, from rest to rest.
     Path(PathMotion),
-    /// The pen changes to this state (0 is up) and the motors stand still for so many periods.
+    /// The pen changes to this state (0 is up) and the motors rest for `periods`.
     Pen { pen: u16, periods: u64 },
 }
 
@@ -50,14 +52,14 @@ impl Motion {
     }
 }
 
-/// A plan: what to do, and when.
+/// A plan: the motion of the motors and of the pen against time.
 #[derive(Clone, Debug)]
 pub struct Trajectory<'a> {
     machine: &'a Machine,
     drawing: Drawing,
     settings: Settings,
     budget: ToleranceBudget,
-    /// All of it, where it is small.
+    /// All of its motions, if it is small.
     cached: Option<Vec<Motion>>,
     periods: u64,
     rows: u64,
@@ -65,15 +67,15 @@ pub struct Trajectory<'a> {
     limiting: LimitingConstraints,
 }
 
-/// How the time of a plan is spent, s.
+/// How the duration of a plan is divided, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Times {
     /// The pen is down and moves (or makes a dot).
-    pub drawing: f64,
+    pub drawing_s: f64,
     /// The pen is up and moves.
-    pub travel: f64,
-    /// The pen is on its way up or down.
-    pub lifting: f64,
+    pub travel_s: f64,
+    /// The pen is being lifted or lowered.
+    pub lifting_s: f64,
 }
 
 /// A row of the plan with the positions its ticks were rounded from.
@@ -85,10 +87,12 @@ pub struct ExactRow {
     pub exact: [f64; 2],
 }
 
-/// Plans a drawing, given in machine mm, in the order of its strokes.
+/// Plans a drawing, given in machine mm, in the order of its strokes. The plan starts and ends at the
+/// machine's start pose, at rest, with the pen up.
 ///
 /// # Errors
-/// When there is no ink, a setting makes no sense, or a stroke leaves what the machine can draw.
+/// [`PlanError::Setting`] if a setting is outside its valid range, [`PlanError::NoInk`] for an empty
+/// drawing, [`PlanError::OutOfReach`] with the first stroke that leaves the machine's reach.
 pub fn plan<'a>(
     machine: &'a Machine,
     drawing: Drawing,
@@ -98,12 +102,11 @@ pub fn plan<'a>(
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
     }
-    let budget = ToleranceBudget::of(machine, settings);
     let trajectory = Trajectory {
         machine,
         drawing,
         settings: settings.clone(),
-        budget,
+        budget: ToleranceBudget::of(machine, settings),
         cached: None,
         periods: 0,
         rows: 1,
@@ -111,17 +114,18 @@ pub fn plan<'a>(
         limiting: LimitingConstraints::default(),
     };
     let period = settings.period_us as f64 * 1e-6;
-    let (mut periods, mut rows, mut times, mut limiting) = (0, 1, Times::default(), LimitingConstraints::default());
+    let (mut periods, mut rows, mut times, mut limiting) =
+        (0, 1, Times::default(), LimitingConstraints::default());
     let (mut cached, mut phases) = (Some(Vec::new()), 0);
     let mut motions = trajectory.motions();
     while let Some(motion) = motions.next_motion()? {
         let time = motion.periods() as f64 * period;
         match &motion {
-            Motion::Pen { .. } => times.lifting += time,
-            Motion::Path(PathMotion { geometry: PathGeometry::Travel(..), .. }) => times.travel += time,
+            Motion::Pen { .. } => times.lifting_s += time,
+            Motion::Path(PathMotion { geometry: PathGeometry::Travel(..), .. }) => times.travel_s += time,
             Motion::Path(PathMotion { profile, .. }) => {
-                times.drawing += time;
-                limiting.add(&profile.limiting, time / profile.duration);
+                times.drawing_s += time;
+                limiting.add(&profile.limiting, time / profile.duration_s);
                 phases += profile.phases.len();
             }
         }
@@ -137,10 +141,10 @@ pub fn plan<'a>(
     Ok(Trajectory { cached, periods, rows, times, limiting, ..trajectory })
 }
 
-/// Looks for strokes that the machine cannot draw, in the drawing's order; gives the first.
+/// Checks that the machine can reach every stroke, in the drawing's order.
 ///
 /// # Errors
-/// With the first stroke that leaves what the machine can draw.
+/// [`PlanError::OutOfReach`] with the first stroke that leaves the machine's reach.
 pub fn check_reach(machine: &Machine, drawing: &Drawing) -> Result<(), PlanError> {
     for (index, stroke) in drawing.strokes.iter().enumerate() {
         let inside = machine
@@ -162,27 +166,28 @@ impl Trajectory<'_> {
         &self.drawing
     }
 
-    /// How the time is spent.
+    /// How the duration is divided.
     pub fn times(&self) -> Times {
         self.times
     }
 
-    /// For how long of the drawing time each limit was what cached it from being shorter, s.
+    /// For how long of the drawing time each constraint was active.
     pub fn limiting(&self) -> LimitingConstraints {
         self.limiting
     }
 
-    /// How long the plan takes, microseconds.
+    /// The duration, microseconds.
     pub fn duration_us(&self) -> u64 {
         self.periods * self.settings.period_us
     }
 
-    /// How many rows [`Self::rows`] gives.
+    /// The number of rows that [`Self::rows`] returns.
     pub fn row_count(&self) -> u64 {
         self.rows
     }
 
-    /// The rows, one period apart; while the motors stand still for the pen only the first row is given.
+    /// The rows, one period apart. While the motors rest for a pen event only the first row is
+    /// emitted. Every call returns the same rows.
     pub fn rows(&self) -> Rows<'_> {
         let source = match &self.cached {
             Some(cached) => Source::Cached(cached.iter()),
@@ -201,6 +206,13 @@ impl Trajectory<'_> {
         }
     }
 
+    /// Drops the cached motions, so that the rows are planned again, as in a large plan. Returns
+    /// whether there were any.
+    #[cfg(feature = "unstable")]
+    pub fn drop_cache(&mut self) -> bool {
+        self.cached.take().is_some()
+    }
+
     fn motions(&self) -> Motions<'_> {
         let planner = StrokePlanner { machine: self.machine, settings: &self.settings, budget: self.budget };
         Motions {
@@ -208,105 +220,104 @@ impl Trajectory<'_> {
             strokes: &self.drawing.strokes,
             next: 0,
             batch: VecDeque::new(),
-            guess: self.machine.start(),
-            here: self.machine.start(),
+            predicted: self.machine.start(),
+            pose: self.machine.start(),
             queue: VecDeque::new(),
             is_down: false,
-            parked: false,
+            finished: false,
         }
     }
 }
 
-/// The motions of a plan, in order, planned as they are asked for.
+/// The motions of a plan, in order, planned on demand.
 #[derive(Clone, Debug)]
 struct Motions<'a> {
     planner: StrokePlanner<'a>,
     strokes: &'a [Stroke],
-    /// The stroke whose motions come next.
+    /// The stroke to plan next.
     next: usize,
-    /// What was planned of the strokes from `next` on.
+    /// Results for the strokes from `next` on, from predicted poses.
     batch: VecDeque<Option<Result<PlannedStroke, OutOfReach>>>,
-    /// Where the machine will be when the batch is drawn, as far as one knows.
-    guess: JointPos,
-    /// Where it is after all motions so far.
-    here: JointPos,
+    /// The predicted pose after the batch.
+    predicted: JointPos,
+    /// The pose after all motions so far.
+    pose: JointPos,
     queue: VecDeque<Motion>,
-    /// Whether the pen has still to be lifted after all motions so far.
+    /// Whether the pen is down after all motions so far.
     is_down: bool,
-    parked: bool,
+    /// Whether the travel back to the start pose is queued.
+    finished: bool,
 }
 
 impl Motions<'_> {
-    /// The next motion, or the reason why there is none where one should be.
+    /// The next motion; `None` at the end of the plan.
     fn next_motion(&mut self) -> Result<Option<Motion>, PlanError> {
         while self.queue.is_empty() {
             if self.next < self.strokes.len() {
                 self.stroke()?;
-            } else if self.parked {
+            } else if self.finished {
                 return Ok(None);
             } else {
-                self.parked = true;
-                let park = self.planner.settings.park.unwrap_or(self.planner.machine.start());
-                self.travel(park);
+                self.finished = true;
+                self.travel(self.planner.machine.start());
             }
         }
         Ok(self.queue.pop_front())
     }
 
-    /// Travels to the next stroke, lowers the pen, draws it and lifts the pen.
+    /// Travels to the next stroke, lowers the pen and draws it.
     fn stroke(&mut self) -> Result<(), PlanError> {
         if self.batch.is_empty() {
             self.plan_batch();
         }
         let (index, stroke) = (self.next, &self.strokes[self.next]);
         self.next += 1;
-        let ready = self.batch.pop_front().flatten();
-        let planned = self.planner.plan(stroke, &self.here, ready).map_err(|source| PlanError::OutOfReach {
-            stroke: index,
-            pen: stroke.pen,
-            span: stroke.source(),
-            source,
+        let candidate = self.batch.pop_front().flatten();
+        let planned = self.planner.plan(stroke, &self.pose, candidate).map_err(|source| {
+            PlanError::OutOfReach { stroke: index, pen: stroke.pen, span: stroke.source(), source }
         })?;
         self.travel(planned.start);
         if index == 0 && self.queue.is_empty() {
-            // The first stroke begins where the plan does: the plan still begins with the pen up.
+            // The first stroke starts at the start pose: the plan still starts with the pen up.
             self.queue.push_back(Motion::Pen { pen: 0, periods: 1 });
         }
         let pen = self.planner.machine.pen();
-        // A dot is nothing but its dwell: without any there would be no ink in the plan.
+        // A dot consists of its dwell: without one the plan would have no ink.
         let dwell =
             whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(planned.motions.is_empty()));
         self.queue.push_back(Motion::Pen { pen: stroke.pen.0, periods: dwell });
-        self.here = planned.end();
+        self.pose = planned.end();
         self.queue.extend(planned.motions.into_iter().map(Motion::Path));
         self.is_down = true;
         Ok(())
     }
 
-    /// Lifts the pen if it is down, and travels. Of the lift's time so much may be travelled as the settings allow, where
-    /// the way takes as long: the lift ends before the next drop begins.
+    /// Lifts the pen if it is down, and travels. Travel overlaps with the lift by the time that the
+    /// settings allow, at most by its own duration: the lift ends before the next drop begins.
     fn travel(&mut self, to: JointPos) {
-        let way = self.planner.travel(self.here, to);
+        let travel = self.planner.travel(self.pose, to);
         if std::mem::take(&mut self.is_down) {
             let whole = whole_periods(self.planner.machine.pen().lift_time_s, self.planner.period());
-            let overlap = (self.planner.settings.lift_overlap / self.planner.period() + 1e-9).floor() as u64;
-            let overlap = overlap.min(way.as_ref().map_or(0, |way| way.periods));
+            let overlap =
+                (self.planner.settings.lift_overlap_s / self.planner.period() + 1e-9).floor() as u64;
+            let overlap = overlap.min(travel.as_ref().map_or(0, |travel| travel.periods));
             self.queue.push_back(Motion::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
         }
-        self.queue.extend(way.map(Motion::Path));
-        self.here = to;
+        self.queue.extend(travel.map(Motion::Path));
+        self.pose = to;
     }
 
-    /// Plans the next strokes side by side, each from the pose in which the machine will probably come to it.
+    /// Plans the next strokes in parallel, each from the pose in which the machine is predicted to
+    /// arrive.
     fn plan_batch(&mut self) {
         let mut starts = Vec::new();
         let mut size = 0;
         for stroke in &self.strokes[self.next..] {
-            let guess = self.planner.predict_poses(stroke, &self.guess);
-            if let Some((_, end)) = guess {
-                self.guess = end;
+            let predicted = self.planner.predict_poses(stroke, &self.predicted);
+            if let Some((_, end)) = predicted {
+                self.predicted = end;
             }
-            starts.push((stroke, guess.map(|(start, _)| start)));
+            starts.push((stroke, predicted.map(|(start, _)| start)));
             size += stroke.segment_count() + 1;
             if size >= BATCH {
                 break;
@@ -320,7 +331,7 @@ impl Motions<'_> {
     }
 }
 
-/// Where rows have their motions from.
+/// Where [`Rows`] takes its motions from.
 #[derive(Clone, Debug)]
 enum Source<'a> {
     Cached(std::slice::Iter<'a, Motion>),
@@ -331,8 +342,10 @@ impl<'a> Source<'a> {
     fn next_motion(&mut self) -> Option<Cow<'a, Motion>> {
         match self {
             Self::Cached(motions) => motions.next().map(Cow::Borrowed),
-            // Whether every stroke can be drawn was seen when the plan was made.
-            Self::Planned(motions) => motions.next_motion().ok().flatten().map(Cow::Owned),
+            Self::Planned(motions) => {
+                let motion = motions.next_motion();
+                motion.expect("planning is deterministic, and `plan` planned every stroke").map(Cow::Owned)
+            }
         }
     }
 }
@@ -343,12 +356,11 @@ pub struct Rows<'a> {
     machine: &'a Machine,
     period_us: u64,
     source: Source<'a>,
-    /// The motion at hand.
+    /// The current motion.
     motion: Option<Cow<'a, Motion>>,
     cursor: Cursor,
     t_us: u64,
     pen: u16,
-    /// Where the joints are.
     pose: JointPos,
     finished: bool,
 }
@@ -377,12 +389,12 @@ impl Iterator for Rows<'_> {
                         return row;
                     }
                 }
-                Some(Motion::Path(movement)) if self.cursor.period == movement.periods => {
-                    self.pose = movement.end;
+                Some(Motion::Path(motion)) if self.cursor.period == motion.periods => {
+                    self.pose = motion.end;
                     self.motion = None;
                 }
-                Some(Motion::Path(movement)) => {
-                    self.pose = self.cursor.pose(self.machine, movement, &self.pose);
+                Some(Motion::Path(motion)) => {
+                    self.pose = self.cursor.pose(self.machine, motion, &self.pose);
                     let row = self.emit();
                     self.cursor.period += 1;
                     self.t_us += self.period_us;
@@ -393,83 +405,66 @@ impl Iterator for Rows<'_> {
     }
 }
 
-/// How far a move has gone.
+/// Position within a motion.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cursor {
-    /// How many of its periods have gone by.
+    /// The number of its periods that have elapsed.
     period: u64,
-    /// Phase of the profile that was last looked at, and the profile's own time at its start.
+    /// The current phase of the profile, and the profile's time at the start of that phase.
     phase: usize,
     phase_start: f64,
 }
 
 impl Cursor {
-    /// The pose now; `near` is the one before.
-    fn pose(&mut self, machine: &Machine, movement: &PathMotion, near: &JointPos) -> JointPos {
-        let PathMotion { geometry, profile, periods, .. } = movement;
+    /// The current pose; `near` is the pose of the row before.
+    fn pose(&mut self, machine: &Machine, motion: &PathMotion, near: &JointPos) -> JointPos {
+        let PathMotion { geometry, profile, periods, .. } = motion;
         // The profile is stretched to a whole number of periods, which only slows it down.
-        let time = profile.duration * (self.period as f64 / *periods as f64);
+        let time = profile.duration_s * (self.period as f64 / *periods as f64);
         while self.phase + 1 < profile.phases.len()
-            && time > self.phase_start + profile.phases[self.phase].duration
+            && time > self.phase_start + profile.phases[self.phase].duration_s
         {
-            self.phase_start += profile.phases[self.phase].duration;
+            self.phase_start += profile.phases[self.phase].duration_s;
             self.phase += 1;
         }
         let phase = &profile.phases[self.phase];
         let s = phase.position_at((time - self.phase_start).max(0.0));
-        // Between rows no joint turns by half a turn, so the last row's pose says which turn this one is in.
-        geometry.pose(machine, phase.piece, s, near)
+        // No joint turns by half a turn between rows, so unwrapping to the last row's pose is unique.
+        let pose = geometry.pose(machine, phase.piece, s, near);
+        pose.expect("the reach of the whole path was checked when it was planned")
     }
 }
 
 impl Rows<'_> {
     fn emit(&self) -> ExactRow {
         let exact = self.machine.motor_positions(&self.pose);
-        let ticks = [exact[0].round() as i64, exact[1].round() as i64];
-        ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks }, exact: [exact[0], exact[1]] }
+        let exact = [exact[0], exact[1]];
+        ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks: exact.map(to_ticks) }, exact }
     }
 }
 
-#[cfg(test)]
-#[path = "../tests/machines/mod.rs"]
-mod machines;
+/// Rounds a motor position to ticks.
+///
+/// # Panics
+/// If it is NaN or beyond the range of `i64`, which a cast would turn into 0 or the nearest bound.
+fn to_ticks(position: f64) -> i64 {
+    let rounded = position.round();
+    assert!(rounded.abs() < 9.2e18, "motor position {position} is not a number of ticks");
+    rounded as i64
+}
 
 #[cfg(test)]
 mod tests {
-    use drawing::{Pen, Point, Span};
+    use super::to_ticks;
 
-    use super::{machines, *};
-
-    /// Enough strokes for several batches: spirals about the base, so that turns differ from stroke to stroke, and ticks.
-    fn crowd() -> Drawing {
-        let spiral = |k: u32| {
-            let point = |j: u32| {
-                let (sin, cos) = libm::sincos(0.1 * f64::from(j) + 0.7 * f64::from(k));
-                let r = 150.0 + 0.1 * f64::from(k) + 0.02 * f64::from(j);
-                Point::new(r * cos, r * sin)
-            };
-            Stroke::polyline(Pen(1), (0..90).map(point).collect(), Span::default()).expect("there are points")
-        };
-        Drawing { strokes: (0..100).map(spiral).collect() }
+    #[test]
+    fn ticks_are_rounded_half_away_from_zero() {
+        assert_eq!([0.4, 0.5, -0.5, -1.4].map(to_ticks), [0, 1, -1, -1]);
     }
 
     #[test]
-    fn rows_are_the_same_at_any_number_of_threads_and_planned_anew() {
-        let machine = machines::arm();
-        let in_pool = |threads: usize| -> Vec<ExactRow> {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| {
-                let mut trajectory = plan(&machine, crowd(), &Settings::new(0.1, 10_000)).expect("a plan");
-                let cached: Vec<ExactRow> = trajectory.rows().collect();
-                assert_eq!(cached.len() as u64, trajectory.row_count());
-                assert!(trajectory.cached.take().is_some());
-                assert!(trajectory.rows().eq(cached.iter().copied()));
-                cached
-            })
-        };
-        let alone = in_pool(1);
-        assert!(alone.len() > 1000);
-        assert_eq!(alone, in_pool(2));
-        assert_eq!(alone, in_pool(5));
+    #[should_panic(expected = "is not a number of ticks")]
+    fn nan_position_is_not_a_tick() {
+        to_ticks(f64::NAN);
     }
 }

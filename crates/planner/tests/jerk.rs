@@ -3,14 +3,19 @@
 
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::Machine;
-use planner::JointPath;
-use planner::path::{PathBudget, CornerBlend, sections};
-use planner::time_parametrization::{SpeedCap, profile};
+use planner::unstable::JointPath;
+use planner::unstable::{CornerBlend, PathBudget, sections};
+use planner::unstable::{SpeedCap, profile};
 
 mod machines;
 
-const BUDGET: PathBudget =
-    PathBudget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Spline, row: f64::INFINITY };
+const BUDGET: PathBudget = PathBudget {
+    chord_mm: 0.01,
+    simplify_mm: 0.0,
+    blend_mm: 0.05,
+    corner: CornerBlend::Spline,
+    row_mm: f64::INFINITY,
+};
 
 fn polyline(points: &[(f64, f64)]) -> Stroke {
     let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
@@ -38,8 +43,8 @@ fn time(machine: &Machine, stroke: &Stroke) -> f64 {
         let (start, end) = (section[0].curve.start(), section[section.len() - 1].curve.end());
         let pose = machine.pose_near(start, &near).expect("within reach");
         let path = JointPath::from_section(machine, section, pose, 0.1).expect("within reach");
-        let cap = SpeedCap { pen: 60.0, row_deviation: f64::INFINITY, period: 1e-3 };
-        time += profile(machine, &path, &cap).duration;
+        let cap = SpeedCap { pen_mm_s: 60.0, row_deviation_mm: f64::INFINITY, period_s: 1e-3 };
+        time += profile(machine, &path, &cap).duration_s;
         near = machine.pose_near(end, &pose).expect("within reach");
     }
     time

@@ -3,8 +3,8 @@
 
 use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
-use planner::placement::{Scale, PlacementOptions, place};
-use planner::{Easing, ExactRow, Law, PlanError, Settings, plan};
+use planner::{Easing, ExactRow, PlanError, Settings, TimingLaw, plan};
+use planner::{PlacementOptions, Scale, place};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -224,7 +224,7 @@ fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
     let trajectory = plan(&machine, line(&[(10.0, 10.0), (110.0, 10.0)]), &settings()).unwrap();
     let (v, a) = (4000.0 / 92.0, 30000.0 / 92.0);
     let exact = 100.0 / v + v / a;
-    assert!(trajectory.times().drawing >= exact && trajectory.times().drawing < exact + 0.011);
+    assert!(trajectory.times().drawing_s >= exact && trajectory.times().drawing_s < exact + 0.011);
 }
 
 #[test]
@@ -247,7 +247,7 @@ fn travel_may_begin_before_a_lift_ends_and_never_ends_before_it() {
     let strokes =
         [line(&[(50.0, 20.0), (60.0, 20.0)]), line(&[(60.0, 20.0), (60.0, 30.0)]), line(&[(90.0, 30.0)])];
     let drawing = Drawing { strokes: strokes.into_iter().flat_map(|drawing| drawing.strokes).collect() };
-    let overlapping = Settings { lift_overlap: 0.06, ..settings() };
+    let overlapping = Settings { lift_overlap_s: 0.06, ..settings() };
     let waits = |settings: &Settings| -> Vec<u64> {
         let rows: Vec<ExactRow> = plan(&machine, drawing.clone(), settings).unwrap().rows().collect();
         let lifted = rows.windows(2).enumerate().filter(|(_, w)| w[0].row.pen > 0 && w[1].row.pen == 0);
@@ -285,8 +285,8 @@ fn a_stroke_that_leaves_the_reach_is_named_with_its_place() {
 fn a_pen_can_be_slower_than_the_machine() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (110.0, 10.0)]);
-    let slow = Settings { pen_speeds: vec![(Pen(1), 5.0), (Pen(2), 1.0)], ..settings() };
-    let seconds = plan(&machine, drawing.clone(), &slow).unwrap().times().drawing;
+    let slow = Settings { pen_speeds_mm_s: vec![(Pen(1), 5.0), (Pen(2), 1.0)], ..settings() };
+    let seconds = plan(&machine, drawing.clone(), &slow).unwrap().times().drawing_s;
     assert!((20.0..20.2).contains(&seconds), "{seconds}");
 }
 
@@ -369,9 +369,10 @@ fn laws_with_a_given_time_give_it_to_every_piece() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0), (10.0, 10.0)]);
     for easing in [Easing::Linear, Easing::SineOut, Easing::QuadraticInOut] {
-        let law = Law::FixedDuration { easing, segment_time_s: 0.504 };
-        let trajectory = plan(&machine, drawing.clone(), &Settings { law, ..settings() }).unwrap();
-        assert!((trajectory.times().drawing - 3.0 * 0.5).abs() < 1e-9);
+        let law = TimingLaw::FixedDuration { easing, segment_time_s: 0.504 };
+        let trajectory =
+            plan(&machine, drawing.clone(), &Settings { timing_law: law, ..settings() }).unwrap();
+        assert!((trajectory.times().drawing_s - 3.0 * 0.5).abs() < 1e-9);
         // Half way in time: x, sin(pi / 4) and a half.
         let down = trajectory.rows().position(|row| row.row.pen == 1).unwrap();
         let share = match easing {
@@ -388,10 +389,11 @@ fn laws_with_a_given_time_give_it_to_every_piece() {
 fn a_trapezoid_rests_at_every_vertex() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0)]);
-    let exact = plan(&machine, drawing.clone(), &Settings { law: Law::Trapezoid, ..settings() }).unwrap();
+    let exact = plan(&machine, drawing.clone(), &Settings { timing_law: TimingLaw::Trapezoid, ..settings() })
+        .unwrap();
     let corner = machine.motor_positions(&JointPos::new(60.0, 10.0));
-    assert!(exact.rows().any(|row| row.exact == [corner[0], corner[1]]));
-    assert!(exact.times().drawing > plan(&machine, drawing, &settings()).unwrap().times().drawing);
+    assert!(exact.rows().any(|row| row.exact == corner.0));
+    assert!(exact.times().drawing_s > plan(&machine, drawing, &settings()).unwrap().times().drawing_s);
 }
 
 #[test]
@@ -409,7 +411,7 @@ fn travel_keeps_to_the_pens_travel_speed() {
                     .map(|row| machine.forward_from_motors(&MotorPos::from(row.exact)))
                     .collect();
                 let steps = points.windows(2).map(|w| (w[1] - w[0]).hypot2().sqrt());
-                (trajectory.times().travel, steps.fold(0.0, f64::max) / 0.01)
+                (trajectory.times().travel_s, steps.fold(0.0, f64::max) / 0.01)
             });
             let [(fast, most), (time, speed)] = times;
             assert!(most > 25.0 && time > fast, "{most} mm/s, {fast} s and {time} s");
@@ -505,4 +507,37 @@ fn acceleration_is_held_between_the_places_of_a_jerk_limited_cell() {
         line(&[(0.4725620466060484, 0.7459843816909811), (0.4567922844151536, 0.7432798298902897)]);
     drawing.strokes.insert(0, round);
     stays_within(&machine, &drawing, 0.1, 878).unwrap();
+}
+
+/// Strokes for several batches: spirals about the base, so that turns differ from stroke to stroke.
+fn spirals() -> Drawing {
+    let spiral = |k: u32| {
+        let point = |j: u32| {
+            let (sin, cos) = libm::sincos(0.1 * f64::from(j) + 0.7 * f64::from(k));
+            let r = 150.0 + 0.1 * f64::from(k) + 0.02 * f64::from(j);
+            Point::new(r * cos, r * sin)
+        };
+        polyline((0..90).map(point).collect())
+    };
+    Drawing { strokes: (0..100).map(spiral).collect() }
+}
+
+#[test]
+fn rows_do_not_depend_on_threads_or_cache() {
+    let machine = machines::arm();
+    let in_pool = |threads: usize| -> Vec<ExactRow> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut trajectory = plan(&machine, spirals(), &settings()).expect("a plan");
+            let cached: Vec<ExactRow> = trajectory.rows().collect();
+            assert_eq!(cached.len() as u64, trajectory.row_count());
+            assert!(trajectory.drop_cache());
+            assert!(trajectory.rows().eq(cached.iter().copied()));
+            cached
+        })
+    };
+    let one = in_pool(1);
+    assert!(one.len() > 1000);
+    assert_eq!(one, in_pool(2));
+    assert_eq!(one, in_pool(5));
 }

@@ -17,17 +17,20 @@ use clarabel::solver::{
 };
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
-use planner::JointPath;
-use planner::joint_path::PathGeometry;
-use planner::path::{PathBudget, CornerBlend, Piece, sections};
-use planner::time_parametrization::{SpeedCap, profile};
+use planner::unstable::{CornerBlend, PathBudget, Piece, sections};
+use planner::unstable::{JointPath, PathGeometry, SpeedCap, profile};
 use proptest::prelude::*;
 
 mod machines;
 
 /// Corners by 0.05 mm, nothing else: the rows' share of the tolerance is another matter.
-const BUDGET: PathBudget =
-    PathBudget { chord: 0.01, simplify: 0.0, blend: 0.05, corner: CornerBlend::Parabola, row: f64::INFINITY };
+const BUDGET: PathBudget = PathBudget {
+    chord_mm: 0.01,
+    simplify_mm: 0.0,
+    blend_mm: 0.05,
+    corner: CornerBlend::Parabola,
+    row_mm: f64::INFINITY,
+};
 
 /// By how much a profile may take longer than the best, as a share.
 const EXCESS: f64 = 0.002;
@@ -264,8 +267,8 @@ fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
 
 /// Time of our law over all sections, s.
 fn ours(machine: &Machine, paths: &[JointPath], pen: f64, period: f64) -> f64 {
-    let cap = SpeedCap { pen, row_deviation: f64::INFINITY, period };
-    paths.iter().map(|path| profile(machine, path, &cap).duration).sum()
+    let cap = SpeedCap { pen_mm_s: pen, row_deviation_mm: f64::INFINITY, period_s: period };
+    paths.iter().map(|path| profile(machine, path, &cap).duration_s).sum()
 }
 
 fn below(machine: &Machine, paths: &[JointPath], pen: f64, parts: usize) -> f64 {

@@ -17,8 +17,7 @@ use compiler::import::{self, Page, PenSettings};
 use compiler::pipeline::{Order, Request};
 use drawing::Pen;
 use kinematics::Machine;
-use planner::placement::{Size, Wish};
-use planner::{Ease, Law};
+use planner::{Easing, PlacementOptions, Scale, TimingLaw};
 
 use crate::cli::{self, Arguments, Command, Planning};
 use crate::failure::Failure;
@@ -73,10 +72,10 @@ fn manual(command: Option<&str>) -> Result<(), Failure> {
 /// The request that the command line's words make, for this page on this machine.
 fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
     let size = if planning.fit {
-        Size::Fit
+        Scale::Fit
     } else {
         let (x, y) = planning.place.unwrap_or((0.0, 0.0));
-        Size::Given { scale: planning.scale.unwrap_or(1.0), origin: drawing::Vec2::new(x, y) }
+        Scale::Explicit { factor: planning.scale.unwrap_or(1.0), origin_mm: drawing::Vec2::new(x, y) }
     };
     let order = match planning.order {
         cli::Order::File => Order::File,
@@ -100,7 +99,7 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
         tolerance_mm: planning.tolerance,
         period_us: (period * 1e6).round().max(0.0) as u64,
         order,
-        wish: Wish { rotate: planning.rotate.unwrap_or(0.0).to_radians(), size },
+        wish: PlacementOptions { rotate_rad: planning.rotate.unwrap_or(0.0).to_radians(), scale: size },
         pen_speeds,
         // The pen is off the paper long before it is all the way up.
         lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
@@ -110,13 +109,14 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
 }
 
 /// The law that the command line's words make.
-fn law(planning: &Planning) -> Law {
-    let eased = |ease: Ease| Law::Eased { ease, segment_time: planning.segment_time };
+fn law(planning: &Planning) -> TimingLaw {
+    let fixed_duration =
+        |easing: Easing| TimingLaw::FixedDuration { easing, segment_time_s: planning.segment_time };
     match planning.law {
-        cli::Law::TimeOptimal => Law::TimeOptimal,
-        cli::Law::Trapezoid => Law::Trapezoid,
-        cli::Law::Linear => eased(Ease::Linear),
-        cli::Law::Sine => eased(Ease::SineOut),
-        cli::Law::Quadratic => eased(Ease::QuadraticInOut),
+        cli::Law::TimeOptimal => TimingLaw::TimeOptimal,
+        cli::Law::Trapezoid => TimingLaw::Trapezoid,
+        cli::Law::Linear => fixed_duration(Easing::Linear),
+        cli::Law::Sine => fixed_duration(Easing::SineOut),
+        cli::Law::Quadratic => fixed_duration(Easing::QuadraticInOut),
     }
 }

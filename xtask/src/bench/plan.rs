@@ -8,11 +8,12 @@ use std::process::Command;
 use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::joint_path::PathGeometry;
-use planner::path::{PathBudget, CornerBlend, sections};
-use planner::placement::{Scale, PlacementOptions, place};
-use planner::time_parametrization::{Profile, SpeedCap, profile, rough_profile};
-use planner::{JointPath, Settings, Trajectory};
+use planner::placement::{PlacementOptions, Scale, place};
+use planner::unstable::{
+    CornerBlend, JointPath, PathBudget, PathGeometry, Profile, SpeedCap, profile, profile_without_refinement,
+    sections,
+};
+use planner::{Settings, Trajectory};
 
 use super::{fastest, workload};
 
@@ -94,7 +95,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
         Goal {
             what: "drawing time",
             unit: "s",
-            figure: trajectory.times().drawing,
+            figure: trajectory.times().drawing_s,
             wanted: 207.0,
             at_most: true,
         },
@@ -280,17 +281,17 @@ struct Stages {
 /// How many phases profiles have, and how long they are, s.
 fn nodes_and_time(profiles: &[Profile]) -> (usize, f64) {
     let phases = profiles.iter().map(|profile| profile.phases.len()).sum();
-    (phases, profiles.iter().map(|profile| profile.duration).sum())
+    (phases, profiles.iter().map(|profile| profile.duration_s).sum())
 }
 
 impl Stages {
     fn of(machine: &Machine, drawing: &Drawing) -> Result<Self> {
         let budget = PathBudget {
-            chord: 0.5 * TOLERANCE,
-            simplify: 0.3 * TOLERANCE,
-            blend: 0.7 * TOLERANCE,
+            chord_mm: 0.5 * TOLERANCE,
+            simplify_mm: 0.3 * TOLERANCE,
+            blend_mm: 0.7 * TOLERANCE,
             corner: CornerBlend::Parabola,
-            row: f64::INFINITY,
+            row_mm: f64::INFINITY,
         };
         let stroke = drawing.strokes.first().context("a workload without strokes")?;
         let (sections, path) = fastest(|| sections(stroke, &budget));
@@ -304,11 +305,15 @@ impl Stages {
             lifted.collect::<Result<Vec<JointPath>>>()
         });
         let paths = paths?;
-        let cap = SpeedCap { pen: machine.pen().max_speed_mm_s, row_deviation: f64::INFINITY, period: 1e-3 };
+        let cap = SpeedCap {
+            pen_mm_s: machine.pen().max_speed_mm_s,
+            row_deviation_mm: f64::INFINITY,
+            period_s: 1e-3,
+        };
         let law = |profile: fn(&Machine, &JointPath, &SpeedCap) -> Profile| {
             fastest(|| paths.iter().map(|path| profile(machine, path, &cap)).collect::<Vec<Profile>>())
         };
-        let (rough, rough_law) = law(rough_profile);
+        let (rough, rough_law) = law(profile_without_refinement);
         let (profiles, time_law) = law(profile);
         let intervals = paths.iter().map(|path| path.intervals.len()).sum();
         Ok(Self { path, lift, rough_law, time_law, intervals, paths, rough, profiles })

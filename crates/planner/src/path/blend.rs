@@ -27,7 +27,7 @@
 
 use drawing::{CubicBez, Point, Segment, Vec2};
 
-use super::{direction_at, distance, is_smooth};
+use super::tangent::{direction_at, distance, is_smooth};
 
 /// Directions that differ by more than this (cosine) turn back: 175 degrees.
 const TURNS_BACK: f64 = -0.9962;

@@ -7,18 +7,19 @@
 //! become parabolas inside the tolerance; where the pen turns back it rests. All of it in machine mm.
 
 mod blend;
+mod piece;
 mod simplify;
 mod slow_zones;
+mod tangent;
 
-use drawing::{Line, Point, Segment, Stroke, Vec2};
+use drawing::{Line, Segment, Stroke};
 
 pub use blend::CornerBlend;
+pub use piece::{Piece, Section};
+use tangent::{direction_at, velocity};
 
 /// Vertices that lie on the straight line between their neighbours, to this distance in mm, are not corners.
 const COLLINEAR: f64 = 1e-9;
-
-/// The largest break of direction that is not a corner, rad: at 1 m/s it asks for a jump of 1 um/s.
-const SMOOTH_ANGLE: f64 = 1e-6;
 
 /// A curve whose speed |p'(t)| somewhere falls below this share of its largest is taken as chords: at a cusp its
 /// direction has no derivative by length.
@@ -28,56 +29,36 @@ const REGULAR: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathBudget {
     /// Chords that stand for curves with a cusp.
-    pub chord: f64,
+    pub chord_mm: f64,
     /// Straight pieces that stand for several.
-    pub simplify: f64,
+    pub simplify_mm: f64,
     /// Blends that stand for corners.
-    pub blend: f64,
+    pub blend_mm: f64,
     /// What becomes of corners.
     pub corner: CornerBlend,
     /// What linear motion between rows may take, where the motors are strong enough to exceed it: then pieces near turns
     /// are marked. Infinite where they are not.
-    pub row: f64,
+    pub row_mm: f64,
 }
-
-/// A stretch of a section, with the path's parameter `s` running evenly in the curve's own parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
-    /// The curve.
-    pub curve: Segment,
-    /// dt/ds, 1/mm: how fast the curve's own parameter runs.
-    pub rate: f64,
-    /// Whether rows on it may deviate because of how the pen speeds up: on turns and near them.
-    pub near_corner: bool,
-}
-
-impl Piece {
-    /// Its extent in `s`, mm.
-    pub fn length(&self) -> f64 {
-        1.0 / self.rate
-    }
-}
-
-/// Pieces that follow one another with a continuous derivative dp/ds; at least one.
-///
-/// `s` is arc length on lines and circles. On blends it runs evenly in time when the pen's velocity changes evenly, and
-/// on ellipses and cubics in the curve's own parameter; each piece's rate is chosen so that dp/ds, not only its
-/// direction, is the same on both sides of every joint. So ds/dt needs no jumps.
-pub type Section = Vec<Piece>;
 
 /// The smooth sections of a stroke, in order; none for a dot or a stroke that goes nowhere.
 pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
-    let pieces = clean(stroke, budget.chord);
-    let pieces = if budget.simplify > 0.0 { simplify::simplify(pieces, budget.simplify) } else { pieces };
-    let sections = blend::sections(&pieces, budget.blend, budget.corner).into_iter().map(parametrise);
+    let pieces = clean(stroke, budget.chord_mm);
+    let pieces =
+        if budget.simplify_mm > 0.0 { simplify::simplify(pieces, budget.simplify_mm) } else { pieces };
+    let sections = blend::sections(&pieces, budget.blend_mm, budget.corner).into_iter().map(parametrise);
     sections
-        .map(|section| if budget.row.is_finite() { slow_zones::mark(section, budget.row) } else { section })
+        .map(
+            |section| {
+                if budget.row_mm.is_finite() { slow_zones::mark(section, budget.row_mm) } else { section }
+            },
+        )
         .collect()
 }
 
 /// Every piece of a stroke as a section of its own: the pen rests at all vertices but those that lie on a straight line.
-pub fn vertex_to_vertex(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
-    clean(stroke, budget.chord).into_iter().map(|curve| parametrise(vec![curve])).collect()
+pub(crate) fn vertex_to_vertex(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
+    clean(stroke, budget.chord_mm).into_iter().map(|curve| parametrise(vec![curve])).collect()
 }
 
 /// The stroke's pieces without those of no length, straight ones in line joined, cusped curves as chords.
@@ -121,21 +102,6 @@ fn parametrise(curves: Vec<Segment>) -> Section {
     curves.into_iter().map(piece).collect()
 }
 
-fn velocity(curve: &Segment, t: f64) -> f64 {
-    curve.derivatives(t).0.hypot2().sqrt()
-}
-
-/// The unit tangent at an end; nothing for a piece of no length.
-fn direction_at(piece: &Segment, t: f64) -> Option<Vec2> {
-    let (first, _) = piece.derivatives(t);
-    let speed = first.hypot2().sqrt();
-    (speed > 0.0).then(|| first / speed)
-}
-
-fn is_smooth(before: Vec2, after: Vec2) -> bool {
-    before.dot(after) > 0.0 && before.cross(after).abs() <= SMOOTH_ANGLE
-}
-
 /// Whether `next` goes on in the direction of `before`: the vertex between lies on the chord, and neither turns back.
 fn in_line(before: &Line, next: &Line) -> bool {
     let (chord, first) = (next.p1 - before.p0, before.p1 - before.p0);
@@ -157,18 +123,19 @@ fn is_regular(segment: &Segment) -> bool {
     least > REGULAR * most || most == 0.0
 }
 
-fn distance(a: Point, b: Point) -> f64 {
-    libm::hypot(a.x - b.x, a.y - b.y)
-}
-
 #[cfg(test)]
 mod tests {
-    use drawing::{EllipticArc, Pen, Span};
+    use drawing::{EllipticArc, Pen, Point, Span, Vec2};
 
     use super::*;
 
-    const EXACT: PathBudget =
-        PathBudget { chord: 0.01, simplify: 0.0, blend: 0.0, corner: CornerBlend::Parabola, row: f64::INFINITY };
+    const EXACT: PathBudget = PathBudget {
+        chord_mm: 0.01,
+        simplify_mm: 0.0,
+        blend_mm: 0.0,
+        corner: CornerBlend::Parabola,
+        row_mm: f64::INFINITY,
+    };
 
     fn polyline(points: &[(f64, f64)]) -> Stroke {
         let points = points.iter().map(|&(x, y)| Point::new(x, y)).collect();
@@ -186,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_reversal_is_a_stop_even_where_corners_are_blended() {
-        let budget = PathBudget { blend: 0.1, ..EXACT };
+        let budget = PathBudget { blend_mm: 0.1, ..EXACT };
         assert_eq!(sections(&polyline(&[(0.0, 0.0), (5.0, 0.0), (2.0, 0.0)]), &budget).len(), 2);
     }
 
@@ -223,7 +190,7 @@ mod tests {
     fn a_chord_of_a_circle_runs_like_the_circle() {
         let points: Vec<(f64, f64)> =
             (0..=60).map(|k| libm::sincos(f64::from(k) * 0.05)).map(|(s, c)| (20.0 * c, 20.0 * s)).collect();
-        let sections = sections(&polyline(&points), &PathBudget { blend: 0.05, ..EXACT });
+        let sections = sections(&polyline(&points), &PathBudget { blend_mm: 0.05, ..EXACT });
         assert_eq!(sections.len(), 1);
         // Neighbouring blends share their segments whole: nothing but the very ends stays straight.
         let straight: f64 = sections[0]

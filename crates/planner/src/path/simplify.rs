@@ -2,7 +2,7 @@
 
 use drawing::{Line, Point, Segment};
 
-use super::distance;
+use super::tangent::distance;
 
 /// Straight runs with fewer pieces, such that every point of either is within `tolerance` mm of the other.
 ///

@@ -6,7 +6,7 @@
 
 use drawing::Segment;
 
-use super::{Piece, Section};
+use super::piece::{Piece, Section};
 
 /// Marks every piece that lies on a turn or so near to one that a row on it may end in the turn, cutting straight
 /// pieces where they leave that zone.

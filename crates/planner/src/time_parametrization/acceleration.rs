@@ -11,8 +11,9 @@
 
 use kinematics::Machine;
 
-use super::{Profile, SpeedCap, constraints::IntervalConstraints};
-use crate::joint_path::{GridInterval, PathGeometry, JointPath};
+use super::constraints::IntervalConstraints;
+use super::profile::{Profile, SpeedCap};
+use crate::joint_path::{GridInterval, JointPath, PathGeometry};
 
 /// How many of the path's own intervals are refined together: memory and cost follow it, and its ends are interval to the
 /// speeds of the coarse law.
@@ -53,7 +54,8 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
 }
 
 /// With no more intervals than the path has, but for such as begin and end at rest.
-pub(super) fn rough(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
+#[cfg(feature = "unstable")]
+pub(super) fn profile_without_refinement(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     let mut profile = Profile::new();
     let grid = Grid::of(machine, path, cap);
     grid.emit(&mut profile);
@@ -80,7 +82,10 @@ struct Grid {
 impl Grid {
     /// Over all of a path, from rest to rest.
     fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
-        let hold = |interval: &GridInterval| ConstrainedInterval { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
+        let hold = |interval: &GridInterval| ConstrainedInterval {
+            constraints: IntervalConstraints::new(machine, interval, cap),
+            interval: *interval,
+        };
         let mut grid = Self { intervals: path.intervals.iter().map(hold).collect(), ..Self::default() };
         grid.sweep(0.0, 0.0);
         grid
@@ -128,14 +133,17 @@ impl Grid {
         let mut time = self.time();
         let (mut order, mut nodes, mut finer) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
-            let Some(subdivisions) = self.subdivisions(time, SHORTEST * cap.period) else { break };
+            let Some(subdivisions) = self.subdivisions(time, SHORTEST * cap.period_s) else { break };
             order.clear();
             for (index, subdivisions) in self.order.iter().zip(subdivisions) {
                 finer.clear();
                 self.intervals[*index].interval.subdivide(machine, geometry, subdivisions, &mut finer);
                 if finer.len() > 1 {
                     order.extend(self.intervals.len()..self.intervals.len() + finer.len());
-                    let hold = |interval: &GridInterval| ConstrainedInterval { constraints: IntervalConstraints::new(machine, interval, cap), interval: *interval };
+                    let hold = |interval: &GridInterval| ConstrainedInterval {
+                        constraints: IntervalConstraints::new(machine, interval, cap),
+                        interval: *interval,
+                    };
                     self.intervals.extend(finer.iter().map(hold));
                 } else {
                     order.push(*index);
@@ -194,7 +202,9 @@ impl Grid {
                 let second = 0.5 * (interval.second[half] + interval.second[half + 1]);
                 for (k, motor) in machine.motors().iter().enumerate() {
                     let acceleration = (first[k] * u + second[k] * b).abs();
-                    excess = excess.max(acceleration * (1.0 + interval.interpolation_error) / motor.max_acceleration_ticks_s2);
+                    excess = excess.max(
+                        acceleration * (1.0 + interval.interpolation_error) / motor.max_acceleration_ticks_s2,
+                    );
                 }
             }
         }

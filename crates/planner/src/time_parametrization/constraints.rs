@@ -15,7 +15,7 @@
 
 use kinematics::Machine;
 
-use super::{LimitingConstraints, Phase, Profile, SpeedCap};
+use super::profile::{LimitingConstraints, Phase, Profile, SpeedCap};
 use crate::joint_path::GridInterval;
 
 /// The condition `|p u + r b| <= 1`, p >= 0, with b at the interval's start.
@@ -60,8 +60,8 @@ enum SpeedShape {
 impl IntervalConstraints {
     pub(super) fn new(machine: &Machine, interval: &GridInterval, cap: &SpeedCap) -> Self {
         let mut strips = [Strip::default(); 8];
-        let pen = cap.pen / interval.pen_speed;
-        let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
+        let pen = cap.pen_mm_s / interval.pen_speed;
+        let rows = 8.0 * cap.row_deviation_mm / (cap.period_s * cap.period_s);
         let (mut largest, mut capped_by) = (pen * pen, SpeedLimit::Pen);
         let mut lower = |b: f64, by: SpeedLimit| {
             if b < largest {
@@ -88,7 +88,8 @@ impl IntervalConstraints {
             strips[7] = Strip { p, r: -r };
         }
         let two_h = 2.0 * interval.length;
-        let top = largest_feasible(if interval.near_corner { &strips } else { &strips[..6] }, two_h).min(largest);
+        let top =
+            largest_feasible(if interval.near_corner { &strips } else { &strips[..6] }, two_h).min(largest);
         Self { strips, two_h, cap: largest, top, capped_by }
     }
 
@@ -227,8 +228,11 @@ impl IntervalConstraints {
             let u = (b1 - b0) / self.two_h;
             let along = (p - share * self.two_h * r) * u;
             let turning = r * (b0 + share * (b1 - b0));
-            let of =
-                if turning.abs() > along.abs() { &mut limiting.turning_s } else { &mut limiting.acceleration_s };
+            let of = if turning.abs() > along.abs() {
+                &mut limiting.turning_s
+            } else {
+                &mut limiting.acceleration_s
+            };
             of[k] += duration;
         }
     }

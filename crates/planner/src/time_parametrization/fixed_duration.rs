@@ -4,7 +4,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{Phase, Profile};
+use super::profile::{Phase, Profile};
 
 /// How the way goes with time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub enum Easing {
 }
 
 /// Over a piece of this length (in the path's parameter) in `time` s.
-pub fn fixed_duration(easing: Easing, length: f64, time: f64) -> Profile {
+pub(crate) fn fixed_duration(easing: Easing, length: f64, time: f64) -> Profile {
     let mean = length / time;
     let mut profile = Profile::new();
     match easing {
@@ -46,10 +46,10 @@ mod tests {
     fn at(profile: &Profile, t: f64) -> f64 {
         let mut since = t;
         for phase in &profile.phases {
-            if since <= phase.duration {
+            if since <= phase.duration_s {
                 return phase.position_at(since);
             }
-            since -= phase.duration;
+            since -= phase.duration_s;
         }
         f64::NAN
     }
@@ -64,10 +64,10 @@ mod tests {
             }),
         ] {
             let profile = fixed_duration(easing, 7.0, 1.5);
-            assert!((profile.duration - 1.5).abs() < 1e-12);
+            assert!((profile.duration_s - 1.5).abs() < 1e-12);
             for k in 0..=100 {
                 let x = f64::from(k) / 100.0;
-                let off = at(&profile, (1.5 * x).min(profile.duration)) - 7.0 * y(x);
+                let off = at(&profile, (1.5 * x).min(profile.duration_s)) - 7.0 * y(x);
                 assert!(off.abs() < 1e-11, "{easing:?} at {x}: off by {off}");
             }
         }

@@ -24,8 +24,9 @@ use drawing::Segment;
 use kinematics::{JointPos, Machine, MotorPos};
 
 use super::polygon::Polygon;
-use super::{Phase, Profile, SpeedCap, acceleration, straight};
-use crate::joint_path::{PathGeometry, JointPath, PathDerivatives, third_derivative};
+use super::profile::{Phase, Profile, SpeedCap};
+use super::{acceleration, straight};
+use crate::joint_path::{JointPath, PathDerivatives, PathGeometry, third_derivative};
 use crate::path::Piece;
 
 /// How often b* is put where the speeds are.
@@ -47,7 +48,7 @@ pub(super) fn applies(machine: &Machine) -> bool {
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     match &path.geometry {
         PathGeometry::Travel(..) => {
-            straight::profile(machine, path.intervals[0].first[0], cap.pen / path.intervals[0].pen_speed)
+            straight::profile(machine, path.intervals[0].first[0], cap.pen_mm_s / path.intervals[0].pen_speed)
         }
         PathGeometry::Drawn(_, section) => {
             let fastest = acceleration::profile(machine, path, cap);
@@ -56,10 +57,11 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
             for _ in 0..PASSES {
                 let Some(states) = solve(&intervals) else { break };
                 let (found, excess) = build_profile(machine, section, &intervals, &states);
-                if !found.duration.is_finite() {
+                if !found.duration_s.is_finite() {
                     break;
                 }
-                let gain = best.as_ref().map_or(f64::INFINITY, |best| 1.0 - found.duration / best.duration);
+                let gain =
+                    best.as_ref().map_or(f64::INFINITY, |best| 1.0 - found.duration_s / best.duration_s);
                 if gain > 0.0 {
                     best = Some(found);
                 }
@@ -91,7 +93,8 @@ impl PointConstraints {
     fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
         let t = (s * piece.rate).clamp(0.0, 1.0);
         let pose: JointPos = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
-        let PathDerivatives { first: m1, second: m2, pen_speed, second_derivative_bound, .. } = PathDerivatives::of(machine, piece, t, &pose);
+        let PathDerivatives { first: m1, second: m2, pen_speed, second_derivative_bound, .. } =
+            PathDerivatives::of(machine, piece, t, &pose);
         let m3 = third_derivative(machine, piece, t, &pose);
         let motors = machine.motors();
         let of = |k: usize, m: &MotorPos, limit: f64| m[k] / limit;
@@ -107,8 +110,9 @@ impl PointConstraints {
 
     /// The largest b by speeds and rows.
     fn cap(&self, cap: &SpeedCap) -> f64 {
-        let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
-        let speed = (cap.pen / self.pen_speed).min(1.0 / self.speed[0].abs()).min(1.0 / self.speed[1].abs());
+        let rows = 8.0 * cap.row_deviation_mm / (cap.period_s * cap.period_s);
+        let speed =
+            (cap.pen_mm_s / self.pen_speed).min(1.0 / self.speed[0].abs()).min(1.0 / self.speed[1].abs());
         (speed * speed).min(rows / self.second_derivative_bound)
     }
 
@@ -180,7 +184,10 @@ impl JerkInterval {
             };
             hold(1.0, 0.0, 0.0, self.cap);
             hold(-1.0, 0.0, 0.0, 0.0);
-            let tangent = (1.5 / self.tangent_points[j].sqrt(), -0.5 / (self.tangent_points[j] * self.tangent_points[j].sqrt()));
+            let tangent = (
+                1.5 / self.tangent_points[j].sqrt(),
+                -0.5 / (self.tangent_points[j] * self.tangent_points[j].sqrt()),
+            );
             for k in 0..2 {
                 for sign in [1.0, -1.0] {
                     let [m1, m2] = point.acceleration[k].map(|m| sign * m);
@@ -217,7 +224,9 @@ impl JerkInterval {
                 most = most.min(libm::cbrt(by * by));
             }
             if self.row_limit.is_finite() {
-                most = most.min(self.row_limit / (point.pen_speed * 2.0 / (3.0 * h) + point.second_derivative_bound));
+                most = most.min(
+                    self.row_limit / (point.pen_speed * 2.0 / (3.0 * h) + point.second_derivative_bound),
+                );
             }
         }
         most
@@ -242,7 +251,7 @@ fn intervals(
     cap: &SpeedCap,
     fastest: &Profile,
 ) -> Option<Vec<JerkInterval>> {
-    let rows = 8.0 * cap.row_deviation / (cap.period * cap.period);
+    let rows = 8.0 * cap.row_deviation_mm / (cap.period_s * cap.period_s);
     let build_up = machine
         .motors()
         .iter()
@@ -321,9 +330,11 @@ fn set_lower_bounds(intervals: &mut [JerkInterval]) {
     for interval in intervals.iter_mut() {
         let most = |of: &dyn Fn(&PointConstraints) -> f64| interval.points.iter().map(of).fold(0.0, f64::max);
         let turn = most(&|point| point.jerk[0][2].abs().max(point.jerk[1][2].abs()));
-        let second_derivative_bound = most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
+        let second_derivative_bound =
+            most(&|point| point.acceleration[0][1].abs().max(point.acceleration[1][1].abs()));
         let rest = interval.points[0].initial_tangent_point(interval.cap, at.min(total - at));
-        interval.lower_bound = rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / second_derivative_bound).min(interval.cap);
+        interval.lower_bound =
+            rest.min(libm::cbrt(0.25 / (turn * turn))).min(0.5 / second_derivative_bound).min(interval.cap);
         at += interval.length;
     }
     let steps = |interval: &JerkInterval, b: f64| {
@@ -333,11 +344,13 @@ fn set_lower_bounds(intervals: &mut [JerkInterval]) {
         b + interval.length * acceleration.min((jerk * b.sqrt()).sqrt())
     };
     for k in 1..intervals.len() {
-        intervals[k].lower_bound =
-            intervals[k].lower_bound.min(steps(&intervals[k - 1], intervals[k - 1].lower_bound.max(1e-9 * intervals[k].cap)));
+        intervals[k].lower_bound = intervals[k]
+            .lower_bound
+            .min(steps(&intervals[k - 1], intervals[k - 1].lower_bound.max(1e-9 * intervals[k].cap)));
     }
     for k in (1..intervals.len()).rev() {
-        intervals[k - 1].lower_bound = intervals[k - 1].lower_bound.min(steps(&intervals[k - 1], intervals[k].lower_bound));
+        intervals[k - 1].lower_bound =
+            intervals[k - 1].lower_bound.min(steps(&intervals[k - 1], intervals[k].lower_bound));
     }
 }
 
@@ -363,13 +376,14 @@ struct SquaredSpeeds<'a> {
 
 impl SquaredSpeeds<'_> {
     fn square(&mut self, piece: usize, s: f64) -> f64 {
-        let before =
-            |phase: &Phase| phase.piece < piece || (phase.piece == piece && phase.position_at(phase.duration) < s);
+        let before = |phase: &Phase| {
+            phase.piece < piece || (phase.piece == piece && phase.position_at(phase.duration_s) < s)
+        };
         while self.at + 1 < self.phases.len() && before(&self.phases[self.at]) {
             self.at += 1;
         }
         let phase = &self.phases[self.at];
-        let way = (s - phase.start).clamp(0.0, phase.position_at(phase.duration) - phase.start);
+        let way = (s - phase.start).clamp(0.0, phase.position_at(phase.duration_s) - phase.start);
         let way = if phase.piece > piece { 0.0 } else { way };
         (phase.speed * phase.speed + 2.0 * phase.acceleration * way).max(0.0)
     }
@@ -405,7 +419,11 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
     let mut states = vec![[0.0, 0.0], [start, rest_ray_slope(intervals[0].length) * start]];
     for k in 1..count - 1 {
         let from = states[k];
-        let w = if k == count - 2 { terminal.w(from) } else { largest_w_into(&sets[k + 1], &intervals[k], from)? };
+        let w = if k == count - 2 {
+            terminal.w(from)
+        } else {
+            largest_w_into(&sets[k + 1], &intervals[k], from)?
+        };
         let to = intervals[k].state(from, w, 1.0);
         states.push([to[0].max(0.0), to[1]]);
     }
@@ -541,13 +559,19 @@ fn build_profile(
             let phase = Phase::even(interval.piece, interval.start, speed, acceleration, duration);
             profile.push(Phase { jerk, ..phase });
             profile.limiting.jerk_s
-                [usize::from(interval.points[1].jerk[1][0].abs() > interval.points[1].jerk[0][0].abs())] += duration;
+                [usize::from(interval.points[1].jerk[1][0].abs() > interval.points[1].jerk[0][0].abs())] +=
+                duration;
             excesses.push((1.0, 1.0));
             continue;
         }
         let w = (to[1] - from[1]) / h;
-        let phase =
-            Phase::even(interval.piece, interval.start, from[0].sqrt(), 0.5 * from[1], duration(h, from, to, w));
+        let phase = Phase::even(
+            interval.piece,
+            interval.start,
+            from[0].sqrt(),
+            0.5 * from[1],
+            duration(h, from, to, w),
+        );
         profile.push(Phase { acceleration_slope: 0.5 * w, ..phase });
         // b is largest at an end, or where c is 0.
         let top = if from[1] > 0.0 && to[1] < 0.0 { from[0] - 0.5 * from[1] * from[1] / w } else { 0.0 };
@@ -558,14 +582,13 @@ fn build_profile(
                 0.5 => interval.points[1],
                 1.0 => interval.points[2],
                 // The curve is within reach all along, so there always is a point.
-                _ => {
-                    PointConstraints::at(machine, &section[interval.piece], interval.start + share * h).unwrap_or(interval.points[1])
-                }
+                _ => PointConstraints::at(machine, &section[interval.piece], interval.start + share * h)
+                    .unwrap_or(interval.points[1]),
             };
             point.utilization(interval.state(from, w, share), w)
         });
         let excess = (peak(shares.map(|share| share.0)), peak(shares.map(|share| share.1)));
-        record_active_constraint(interval, from, to, excess, phase.duration, &mut profile);
+        record_active_constraint(interval, from, to, excess, phase.duration_s, &mut profile);
         slower = slower.max(excess.0.sqrt()).max(libm::cbrt(excess.1)).max(speed.sqrt());
         let beyond = |share: f64| if share > EXCESS { share } else { 1.0 };
         excesses.push((beyond(excess.0), beyond(excess.1)));
@@ -577,13 +600,24 @@ fn build_profile(
 fn peak<const N: usize>(samples: [f64; N]) -> f64 {
     let top = |w: &[f64]| {
         let (slope, second_derivative_bound) = (0.5 * (w[2] - w[0]), 2.0 * w[1] - w[0] - w[2]);
-        if slope.abs() < second_derivative_bound { w[1] + 0.5 * slope * slope / second_derivative_bound } else { w[1] }
+        if slope.abs() < second_derivative_bound {
+            w[1] + 0.5 * slope * slope / second_derivative_bound
+        } else {
+            w[1]
+        }
     };
     samples.windows(3).map(top).fold(samples[0].max(samples[N - 1]), f64::max)
 }
 
 /// Books the time of a interval to what is nearest to its limit.
-fn record_active_constraint(interval: &JerkInterval, from: State, to: State, excess: (f64, f64), duration: f64, profile: &mut Profile) {
+fn record_active_constraint(
+    interval: &JerkInterval,
+    from: State,
+    to: State,
+    excess: (f64, f64),
+    duration: f64,
+    profile: &mut Profile,
+) {
     let limiting = &mut profile.limiting;
     let point = &interval.points[1];
     let w = (to[1] - from[1]) / interval.length;
@@ -636,7 +670,7 @@ fn slowed_until_smooth(machine: &Machine, profile: Profile, cap: &SpeedCap) -> P
     let of = |motor: &kinematics::Motor| {
         motor
             .max_jerk_ticks_s3
-            .map_or(1.0, |jerk| (2.0 * motor.max_acceleration_ticks_s2 / (jerk * cap.period)).sqrt())
+            .map_or(1.0, |jerk| (2.0 * motor.max_acceleration_ticks_s2 / (jerk * cap.period_s)).sqrt())
     };
     let slower = machine.motors().iter().map(of).fold(1.0, f64::max);
     profile.slowed(slower)

@@ -2,7 +2,7 @@
 
 use kinematics::{Machine, MotorPos};
 
-use super::{Phase, Profile};
+use super::profile::{Phase, Profile};
 
 /// A straight way in joint space, no faster than `fastest`: even jerk up to the largest acceleration, and so on, both halves alike.
 pub(super) fn profile(machine: &Machine, change: MotorPos, fastest: f64) -> Profile {

@@ -54,7 +54,7 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         match placed {
             Ok(placed) => {
                 let _ = writeln!(text, "{} can draw it", machine.machine.name());
-                let beyond = placement::beyond_sheet(&machine.machine, &placed);
+                let beyond = placement::beyond_sheet_mm(&machine.machine, &placed);
                 if beyond > 1e-6 {
                     terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));
                     if arguments.reading.strict {

@@ -7,7 +7,7 @@ use compiler::report;
 use drawing::Drawing;
 use kinematics::Machine;
 use planner::PlanError;
-use planner::placement::{Size, Wish, place};
+use planner::{PlacementOptions, Scale, place};
 use serde_json::json;
 
 use crate::cli::{Convert, Format, ReportForm};
@@ -162,7 +162,7 @@ pub(super) fn explain(
         machine.sheet().x1,
         machine.sheet().y1,
     );
-    let fit = Wish { size: Size::Fit, ..request.wish };
+    let fit = PlacementOptions { scale: Scale::Fit, ..request.wish };
     let help = match place(machine, drawing, &fit) {
         Ok(map) => {
             let [a, b, ..] = map.as_coeffs();
