@@ -111,7 +111,7 @@ impl Said {
 }
 
 #[test]
-fn wrong_words_end_with_2() {
+fn usage_errors_exit_2() {
     let desk = Desk::new();
     desk.put("sped.toml", &desk.good("machine show coaxial").text().replacen("max_speed", "max_sped", 1));
     desk.put("singular.toml", &desk.good("machine show corexy").text().replacen("[1, -1]", "[2, 2]", 1));
@@ -146,7 +146,7 @@ fn wrong_words_end_with_2() {
 }
 
 #[test]
-fn what_cannot_be_read_or_written_ends_with_3() {
+fn io_errors_exit_3() {
     let desk = Desk::new();
     let before = desk.names();
     for arguments in [
@@ -176,7 +176,7 @@ fn what_cannot_be_read_or_written_ends_with_3() {
 }
 
 #[test]
-fn drawings_that_cannot_be_planned_end_with_1() {
+fn unplannable_drawings_exit_1() {
     let desk = Desk::new();
     desk.put("empty.hpgl", "");
     desk.put("letter.txt", "Dear plotter, please draw a house.\n");
@@ -197,7 +197,7 @@ fn drawings_that_cannot_be_planned_end_with_1() {
 }
 
 #[test]
-fn a_refused_plan_leaves_an_output_file_as_it_was() {
+fn failed_plan_keeps_output_file() {
     let desk = Desk::new();
     desk.put("plan.ticks", "as it was");
     let before = desk.names();
@@ -215,7 +215,7 @@ fn a_refused_plan_leaves_an_output_file_as_it_was() {
 
 #[cfg(unix)]
 #[test]
-fn a_link_keeps_standing() {
+fn symlink_output_is_preserved() {
     let desk = Desk::new();
     desk.put("plan.ticks", "");
     std::os::unix::fs::symlink("plan.ticks", desk.path().join("link")).expect("a link can be made");
@@ -228,7 +228,7 @@ fn a_link_keeps_standing() {
 }
 
 #[test]
-fn strict_takes_warnings_for_errors_and_nothing_else() {
+fn strict_treats_warnings_as_errors() {
     let desk = Desk::new();
     desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
     for command in
@@ -254,7 +254,7 @@ fn strict_takes_warnings_for_errors_and_nothing_else() {
 }
 
 #[test]
-fn a_json_report_is_the_last_line_of_standard_error() {
+fn json_report_is_last_line_of_stderr() {
     let desk = Desk::new();
     for machine in PRESETS {
         let said = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv --report json"));
@@ -274,7 +274,7 @@ fn a_json_report_is_the_last_line_of_standard_error() {
 }
 
 #[test]
-fn a_minus_is_standard_input_and_standard_output() {
+fn dash_is_stdin_and_stdout() {
     let desk = Desk::new();
     let from_file = desk.good("convert tiny.hpgl --machine hbot");
     let piped = desk.run_with("convert - --machine hbot --output -", TINY);
@@ -290,7 +290,7 @@ fn a_minus_is_standard_input_and_standard_output() {
 }
 
 #[test]
-fn the_same_drawing_gives_the_same_bytes() {
+fn plans_are_deterministic() {
     let desk = Desk::new();
     for format in ["ticks", "csv", "json", "hpgl", "svg"] {
         let command = format!("convert tiny.hpgl --machine polar --format {format}");
@@ -304,7 +304,7 @@ fn the_same_drawing_gives_the_same_bytes() {
 }
 
 #[test]
-fn whoever_has_read_enough_may_leave() {
+fn closed_stdout_exits_quietly() {
     let desk = Desk::new();
     // More than a pipe holds, so that the program has to notice.
     let command = "convert tiny.hpgl --machine cartesian --fit --period 1ms";
@@ -321,7 +321,7 @@ fn whoever_has_read_enough_may_leave() {
 }
 
 #[test]
-fn drawings_need_no_machine() {
+fn drawing_formats_need_no_machine() {
     let desk = Desk::new();
     desk.good("convert tiny.hpgl --format hpgl --output clean.hpgl");
     let clean = desk.text("clean.hpgl");
@@ -333,7 +333,7 @@ fn drawings_need_no_machine() {
 }
 
 #[test]
-fn a_shown_machine_is_the_machine() {
+fn shown_machine_file_gives_same_plan() {
     let desk = Desk::new();
     for machine in PRESETS {
         let shown = desk.good(&format!("machine show {machine}"));
@@ -348,7 +348,7 @@ fn a_shown_machine_is_the_machine() {
 }
 
 #[test]
-fn machines_are_listed_and_checked() {
+fn machine_list_and_check() {
     let desk = Desk::new();
     let checks = PRESETS.map(|machine| format!("machine check {machine}"));
     let mut commands = vec!["machine list"];
@@ -358,7 +358,7 @@ fn machines_are_listed_and_checked() {
 }
 
 #[test]
-fn a_plan_of_ones_own_machine_needs_its_file() {
+fn verify_needs_file_of_custom_machine() {
     let desk = Desk::new();
     let mine = desk.good("machine show coaxial").text().replacen("\"coaxial\"", "\"mine\"", 1);
     desk.put("mine.toml", &mine.replacen("\"206mm\"", "\"200mm\"", 1));
@@ -378,7 +378,7 @@ fn a_plan_of_ones_own_machine_needs_its_file() {
 }
 
 #[test]
-fn plans_of_every_format_are_verified() {
+fn verify_reads_every_plan_format() {
     let desk = Desk::new();
     desk.put("other.hpgl", &TINY.replacen("PD200,600", "PD200,640", 1));
     for machine in PRESETS {
@@ -398,7 +398,7 @@ fn plans_of_every_format_are_verified() {
 }
 
 #[test]
-fn without_its_drawing_a_plans_motion_is_verified() {
+fn verify_without_drawing_checks_motion() {
     let desk = Desk::new();
     desk.good("convert tiny.hpgl --machine polar --format csv --output plan.csv");
     let said = desk.good("verify plan.csv");
@@ -428,7 +428,7 @@ fn tampered(csv: &str, row: usize, column: usize, by: i64) -> String {
 }
 
 #[test]
-fn a_plan_that_was_tampered_with_does_not_hold() {
+fn tampered_plan_fails_verification() {
     let desk = Desk::new();
     for machine in PRESETS {
         let plan = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv"));
@@ -457,7 +457,7 @@ fn a_plan_that_was_tampered_with_does_not_hold() {
 }
 
 #[test]
-fn a_plan_that_was_cut_off_is_no_plan() {
+fn truncated_plan_is_rejected() {
     let desk = Desk::new();
     for format in ["ticks", "csv", "json"] {
         let plan = desk.good(&format!("convert tiny.hpgl --machine corexy --format {format}"));
@@ -473,7 +473,7 @@ fn a_plan_that_was_cut_off_is_no_plan() {
 }
 
 #[test]
-fn pictures_of_drawings_and_plans() {
+fn preview_of_drawings_and_plans() {
     let desk = Desk::new();
     // A picture shows what leaves the reach, too.
     desk.good("preview large.hpgl --machine hbot --output large.svg");
@@ -497,7 +497,7 @@ fn pictures_of_drawings_and_plans() {
 }
 
 #[test]
-fn checks_and_facts() {
+fn check_and_info_reports() {
     let desk = Desk::new();
     desk.put("quirk.hpgl", QUIRKS);
     desk.put("two-pages.hpgl", TWO_PAGES);
@@ -525,7 +525,7 @@ fn checks_and_facts() {
 }
 
 #[test]
-fn one_page_is_planned_at_a_time() {
+fn page_selection() {
     let desk = Desk::new();
     desk.put("two-pages.hpgl", TWO_PAGES);
     for (page, pen) in [("", 1), (" --page 1", 1), (" --page 2", 3)] {
@@ -545,7 +545,7 @@ fn one_page_is_planned_at_a_time() {
 }
 
 #[test]
-fn diagnostics_for_programs() {
+fn json_diagnostics() {
     let desk = Desk::new();
     desk.put("quirk.hpgl", QUIRKS);
     let said = desk
@@ -558,7 +558,7 @@ fn diagnostics_for_programs() {
 }
 
 #[test]
-fn drawings_are_written_in_either_language() {
+fn hpgl_output_in_both_encodings() {
     let desk = Desk::new();
     let plain = desk.good("convert tiny.hpgl --format hpgl");
     desk.good("convert tiny.hpgl --format hpgl --hpgl2 --output encoded.hpgl");
@@ -567,7 +567,7 @@ fn drawings_are_written_in_either_language() {
 }
 
 #[test]
-fn help_for_people_and_shells() {
+fn help_man_pages_and_completions() {
     let desk = Desk::new();
     let said =
         desk.transcript(&["--help", "convert --help", "machine --help", "explain H0101", "explain plotters"]);
@@ -609,7 +609,7 @@ fn help_for_people_and_shells() {
 }
 
 #[test]
-fn machines_of_ones_own_go_by_their_names() {
+fn machine_files_in_config_folder_by_name() {
     let desk = Desk::new();
     let folder = desk.path().join("plotplan/machines");
     fs::create_dir_all(&folder).expect("a folder");
@@ -632,7 +632,7 @@ fn machines_of_ones_own_go_by_their_names() {
 }
 
 #[test]
-fn points_are_a_drawing() {
+fn point_list_import() {
     let desk = Desk::new();
     desk.put("points.txt", "// seed 4's\n<70.05, 82.46>, <74.10, 83.20>,\n<74.1, 83.2>, <74.10, 90.00>\n");
     let svg = desk.good("convert points.txt --format svg");
@@ -652,7 +652,7 @@ fn placement(csv: &str) -> Vec<f64> {
 }
 
 #[test]
-fn drawings_lie_where_they_are_put() {
+fn placement_options() {
     let desk = Desk::new();
     let placed = |wish: &str| {
         placement(desk.good(&format!("convert tiny.hpgl --machine coaxial --format csv {wish}")).text())
@@ -681,7 +681,7 @@ fn drawings_lie_where_they_are_put() {
 
 /// A plan begins and ends with the pen up, wherever its ink does.
 #[test]
-fn ink_may_begin_and_end_at_the_start_pose() {
+fn ink_at_start_pose() {
     let desk = Desk::new();
     desk.put("there.hpgl", "IN;SP1;PU0,0;PD400,0,400,400,0,0;PU;");
     let said = desk.good("convert there.hpgl --machine cartesian --format csv");
@@ -692,7 +692,7 @@ fn ink_may_begin_and_end_at_the_start_pose() {
 }
 
 #[test]
-fn settings_are_kept() {
+fn settings_in_plan_document() {
     let desk = Desk::new();
     let plan =
         |options: &str| desk.good(&format!("convert tiny.hpgl --machine corexy --format csv {options}"));
@@ -724,7 +724,7 @@ fn pen_downs(csv: &str) -> Vec<(i64, f64, f64)> {
 }
 
 #[test]
-fn strokes_are_drawn_in_the_order_that_was_asked_for() {
+fn ordering_options() {
     let desk = Desk::new();
     desk.put("pens.hpgl", PENS);
     let run = |options: &str| {

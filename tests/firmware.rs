@@ -225,7 +225,7 @@ fn coaxial_ink(file: &str, start: Point, first: Option<usize>, point: &dyn Fn(&s
 }
 
 #[test]
-fn the_coaxial_arm_draws_its_command_file() {
+fn coaxial_commands_ink() {
     let machine = preset("coaxial");
     for file in DRAWINGS {
         let plan = plan(file, "coaxial", &[]);
@@ -248,7 +248,7 @@ fn the_coaxial_arm_draws_its_command_file() {
 }
 
 #[test]
-fn the_command_file_in_inches_says_the_same() {
+fn coaxial_commands_in_inches_ink() {
     let machine = ruler(Geometry::Cartesian(Cartesian));
     let sheet = preset("coaxial").sheet();
     for file in DRAWINGS {
@@ -305,7 +305,7 @@ fn single_belt_ink(file: &str, first: Option<usize>) -> Lines {
 }
 
 #[test]
-fn the_single_belt_plotter_draws_its_lines() {
+fn xy_serial_ink() {
     let machine = preset("hbot");
     for file in DRAWINGS {
         let plan = plan(file, "hbot", &[]);
@@ -345,7 +345,7 @@ fn polar_ink(points: impl Iterator<Item = Point>) -> Lines {
 }
 
 #[test]
-fn the_polar_robot_draws_its_points() {
+fn polar_csv_and_c_arrays_ink() {
     let machine = ruler(Geometry::Polar(Polar));
     let plan = plan(ONE_STROKE, "polar", &[]);
     let drawing = placed(ONE_STROKE, &plan);
@@ -405,7 +405,7 @@ fn planned(plan: &TickTable) -> Lines {
 }
 
 #[test]
-fn an_ebb_loses_and_gains_no_step() {
+fn ebb_step_count_is_exact() {
     let mut steps = 0;
     for machine in ["corexy", "hbot", "cartesian"] {
         for file in DRAWINGS {
@@ -435,7 +435,7 @@ fn an_ebb_loses_and_gains_no_step() {
 }
 
 #[test]
-fn an_ebb_keeps_the_plans_time() {
+fn ebb_step_times() {
     let plan = plan(DRAWINGS[0], "cartesian", &["--period", "4130us"]);
     let text = convert(DRAWINGS[0], "cartesian", "ebb", &["--period", "4130us"]);
     let mut said_us = 0;
@@ -475,7 +475,7 @@ fn as_grbl(text: &str) -> String {
 }
 
 #[test]
-fn g_code_draws_the_drawing_with_its_arcs() {
+fn gcode_ink_with_arcs() {
     let ruler = ruler(Geometry::Cartesian(Cartesian));
     for file in DRAWINGS {
         let plan = plan(file, "cartesian", &[]);
@@ -499,7 +499,7 @@ fn g_code_draws_the_drawing_with_its_arcs() {
 }
 
 #[test]
-fn timed_g_code_draws_the_plan_in_its_time() {
+fn gcode_timed_ink_and_duration() {
     let ruler = ruler(Geometry::Cartesian(Cartesian));
     for machine in ["cartesian", "coaxial", "polar"] {
         let file = DRAWINGS[0];
@@ -526,7 +526,7 @@ fn timed_g_code_draws_the_plan_in_its_time() {
 }
 
 #[test]
-fn klipper_makes_every_step_at_its_time() {
+fn klipper_step_times() {
     for (file, machine) in [(DRAWINGS[0], "corexy"), (DRAWINGS[1], "coaxial"), (DRAWINGS[3], "hbot")] {
         let plan = plan(file, machine, &[]);
         let text = convert(file, machine, "klipper-steps", &[]);
@@ -609,7 +609,7 @@ fn sampled(samples: impl Iterator<Item = (u16, Point)>) -> Lines {
 }
 
 #[test]
-fn a_trajectory_controller_draws_its_quintics() {
+fn joint_trajectory_quintic_ink() {
     let ruler = ruler(Geometry::Cartesian(Cartesian));
     for name in ["coaxial", "polar", "corexy"] {
         let machine = preset(name);
@@ -662,7 +662,7 @@ fn a_trajectory_controller_draws_its_quintics() {
 }
 
 #[test]
-fn streamers_and_servo_drives_draw_the_plan() {
+fn halstreamer_and_pvt_ink() {
     let ruler = ruler(Geometry::Cartesian(Cartesian));
     for name in ["coaxial", "hbot", "polar"] {
         let machine = preset(name);
@@ -729,7 +729,7 @@ fn refusal(arguments: &[&str]) -> String {
 }
 
 #[test]
-fn what_a_format_cannot_say_is_refused_or_told() {
+fn unrepresentable_plans_and_losses_are_reported() {
     let house = DRAWINGS[0];
     let said = [
         vec![house, "--fit", "-m", "corexy", "-f", "xy-serial"],
@@ -748,7 +748,7 @@ fn what_a_format_cannot_say_is_refused_or_told() {
 }
 
 #[test]
-fn the_documentation_names_every_format() {
+fn formats_page_lists_every_format() {
     let text = std::fs::read_to_string(top().join("docs/formats.md")).expect("docs/formats.md");
     let help =
         Command::new(cargo_bin!("plotplan")).args(["convert", "-h"]).output().expect("the program runs");

@@ -62,7 +62,7 @@ fn say(command: &str, folder: &Path) -> String {
 }
 
 #[test]
-fn its_commands_say_what_it_says() {
+fn readme_commands_print_the_shown_output() {
     let folder = TempDir::new().expect("a folder");
     let mut pictures = 0;
     for (command, expected) in commands(&readme()) {
@@ -78,7 +78,7 @@ fn its_commands_say_what_it_says() {
 }
 
 #[test]
-fn its_links_lead_somewhere() {
+fn readme_links_exist() {
     let readme = readme();
     let links: Vec<&str> = readme.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
     assert!(links.len() > 5);

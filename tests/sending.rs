@@ -150,7 +150,7 @@ fn wanted(protocol: &str, plan: &TickTable) -> Lines {
 }
 
 #[test]
-fn every_mishap_in_every_protocol_leaves_the_ink_as_planned() {
+fn faults_in_every_protocol_leave_ink_unchanged() {
     let desk = Desk::new(DRAWING);
     let plan = desk.plan();
     // Times are the machine's, which lives ten times as fast.
@@ -192,7 +192,7 @@ fn every_mishap_in_every_protocol_leaves_the_ink_as_planned() {
 }
 
 #[test]
-fn what_is_stopped_by_ctrl_c_is_gone_on_with() {
+fn resume_after_ctrl_c() {
     let desk = Desk::new(DRAWING);
     let plan = desk.plan();
     thread::scope(|scope| {
@@ -227,7 +227,7 @@ fn what_is_stopped_by_ctrl_c_is_gone_on_with() {
 }
 
 #[test]
-fn a_port_that_stays_away_is_given_up() {
+fn lost_port_times_out() {
     let desk = Desk::new(DRAWING);
     let device = desk.device("ticks", "tty", &["--fault", "unplugged=2s:60min"]);
     let output =
@@ -244,7 +244,7 @@ fn a_port_that_stays_away_is_given_up() {
 }
 
 #[test]
-fn what_was_given_up_is_gone_on_with_from_where_the_machine_is() {
+fn resume_from_reported_position_after_lost_port() {
     let desk = Desk::new(DRAWING);
     let plan = desk.plan();
     thread::scope(|scope| {
@@ -272,7 +272,7 @@ fn what_was_given_up_is_gone_on_with_from_where_the_machine_is() {
 }
 
 #[test]
-fn plans_of_every_format_and_files_of_the_machines_own_words_are_sent() {
+fn send_reads_plans_and_firmware_formats() {
     let desk = Desk::new(DRAWING);
     desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "csv", "-o", "plan.csv"]);
     desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "json", "-o", "plan.json"]);
@@ -307,7 +307,7 @@ fn plans_of_every_format_and_files_of_the_machines_own_words_are_sent() {
 }
 
 #[test]
-fn another_pen_is_waited_for() {
+fn pen_change_awaits_operator() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;SP2;PU100,200;PD300,200;PU;");
     let plan = desk.plan();
     let device = desk.device("gcode", "tty", &["--haste", HASTE]);
@@ -322,7 +322,7 @@ fn another_pen_is_waited_for() {
 }
 
 #[test]
-fn machines_that_do_not_answer_get_lines_at_once_or_at_their_time() {
+fn raw_and_paced_protocols() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;");
     let plan = desk.plan();
     // At once, as fast as the machine takes them: its pseudo-terminal holds the rest back.
@@ -342,7 +342,7 @@ fn machines_that_do_not_answer_get_lines_at_once_or_at_their_time() {
 }
 
 #[test]
-fn what_would_be_sent_is_shown() {
+fn dry_run_output() {
     let desk = Desk::new("IN;SP1;PU100,100;PD104,100;PU;");
     let mut shown = String::new();
     for protocol in PROTOCOLS.into_iter().chain(["paced", "raw"]) {
