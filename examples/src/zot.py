@@ -1,4 +1,4 @@
-"""zot.hpgl: the word ZOT as one closed outline, for a polar drawing robot (a student report's listing: radii in mm,
+"""zot.hpgl: the word ZOT as one closed outline, for a polar drawing robot (docs/references.md, report 4: radii in mm,
 angles in degrees, theta = 180 - atan2(y, x), so x = -r cos(theta), y = r sin(theta) about the robot's shaft).
 
 Plotter units are 0.025 mm; the file's (0, 0) is the lower left corner (-138, 0) of the half ring's bounding box.

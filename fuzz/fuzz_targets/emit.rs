@@ -1,4 +1,4 @@
-//! Any bytes: what is written for a drawing reads back without a word, and is written again the same.
+//! Arbitrary bytes: emitted HPGL reads back without diagnostics, and emits the same bytes again.
 #![no_main]
 
 use hpgl::{EmitOptions, Encoding, Options, emit, read};

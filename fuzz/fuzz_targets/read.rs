@@ -1,4 +1,4 @@
-//! Any bytes: parse and interpret never panic, and one pass gives what two give.
+//! Arbitrary bytes: parse and interpret never panic, and `read` equals `interpret(parse)`.
 #![no_main]
 
 use hpgl::{Options, interpret, parse, read};
