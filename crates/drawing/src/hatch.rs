@@ -52,7 +52,7 @@ pub struct HatchGrid {
 
 impl HatchGrid {
     /// The parts of the lines inside closed outlines, line by line, the parts of every odd line in
-    /// reverse order, so that a pen goes to and fro (it still has to draw odd lines from `to` to
+    /// reverse order, so that a pen goes back and forth (it still has to draw odd lines from `to` to
     /// `from`).
     ///
     /// `outlines` are the pieces of all outlines; the pieces of each must form a closed path.

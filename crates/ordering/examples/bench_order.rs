@@ -1,7 +1,9 @@
-//! Orders the drawings of a benchmark and prints the travel:
-//! `bench_order [--effort N] [--merge] [--time] FILE.hpgl …`, with `--time` by the time of a small CoreXY machine.
+//! Orders benchmark drawings and prints the travel:
+//! `bench_order [--effort N] [--merge] [--time] FILE.hpgl …`. With `--time` the cost is the time of
+//! a small CoreXY machine.
 //!
-//! Reads only what the generator of the benchmark writes: `SP`, `PUx,y` and `PDx,y,…` in plotter units of 0.025 mm.
+//! Reads the output of the benchmark's generator only: `SP`, `PUx,y` and `PDx,y,…` in plotter units
+//! of 0.025 mm.
 
 #![allow(
     clippy::print_stdout,
@@ -31,7 +33,8 @@ fn read(text: &str) -> Drawing {
     Drawing { strokes }
 }
 
-/// Pen-up time of two coupled motors at 200 mm/s and 2000 mm/s² each, with 0.3 s for lift and drop.
+/// Travel time, s, of two coupled motors at 200 mm/s and 2000 mm/s² each, plus 0.3 s for lift and
+/// drop.
 fn corexy_time(a: Point, b: Point) -> f64 {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let (speed, acceleration) = (200.0, 2000.0);

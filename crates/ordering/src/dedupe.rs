@@ -4,7 +4,8 @@ use drawing::{Point, Segment, Stroke};
 
 use crate::touch::square;
 
-/// Key of a segment, equal in both directions: the grid squares of its points at t = 0, 1/4, 3/4, 1.
+/// Key of a segment, equal in both directions: the grid squares of its points at t = 0, 1/4, 3/4,
+/// 1.
 type SegmentKey = [[i64; 2]; 4];
 
 fn segment_key(segment: &Segment) -> SegmentKey {
@@ -19,8 +20,8 @@ fn segment_key(segment: &Segment) -> SegmentKey {
     forward.min(backward)
 }
 
-/// Removes each stroke (all of one pen) whose segments are all drawn by other strokes, starting with
-/// the last stroke. A dot on a vertex of a stroke, or on another dot, is a duplicate too.
+/// Removes each stroke (all of one pen) whose segments are all drawn by other strokes, starting
+/// with the last stroke. A dot on a vertex of a stroke, or on another dot, is a duplicate too.
 pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
     let mut keys: Vec<(SegmentKey, u32)> = Vec::new();
     for stroke in &strokes {

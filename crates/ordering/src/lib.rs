@@ -77,8 +77,8 @@ impl<F: Fn(Point, Point) -> f64 + Sync> Cost for F {
 /// Options of [`optimize`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// 0: local optimum from several starts. 1, 2 (default), 3: perturbation search after that, each
-    /// eight times as long as the one before.
+    /// 0: local optimum from several starts. 1, 2 (default), 3: perturbation search after that,
+    /// each eight times as long as the one before.
     pub effort: u8,
     /// Removes strokes all of whose segments are drawn by other strokes of the same pen.
     pub dedupe: bool,

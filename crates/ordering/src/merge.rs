@@ -154,7 +154,8 @@ impl Circuits {
         true
     }
 
-    /// Splices the circuits through a point into the first trail through it, by exchanging partners.
+    /// Splices the circuits through a point into the first trail through it, by exchanging
+    /// partners.
     fn splice(&mut self, meeting: &[End], partner: &mut [Option<End>]) {
         let Some(&anchor) = meeting.first() else { return };
         for &end in meeting {
@@ -164,8 +165,8 @@ impl Circuits {
             match (partner[anchor], partner[end]) {
                 (Some(a), Some(b)) if anchor % 2 == end % 2 => exchange(partner, (anchor, a), (b, end)),
                 (Some(a), Some(b)) => exchange(partner, (anchor, a), (end, b)),
-                // A trail begins or ends here: it is extended by the circuit. A start is joined to an
-                // end, in case directions must be kept.
+                // A trail begins or ends here: it is extended by the circuit. A start is joined to
+                // an end, in case directions must be kept.
                 (None, Some(b)) => extend(partner, anchor, end, b),
                 (Some(a), None) => extend(partner, end, anchor, a),
                 (None, None) => {}
@@ -180,8 +181,8 @@ fn exchange(partner: &mut [Option<End>], a: (End, End), b: (End, End)) {
     (partner[a.1], partner[b.1]) = (Some(b.1), Some(a.1));
 }
 
-/// Separates the pair `(a, b)`, joins the one of the other kind (start or end) to `open`, and leaves
-/// the other one open.
+/// Separates the pair `(a, b)`, joins the one of the other kind (start or end) to `open`, and
+/// leaves the other one open.
 fn extend(partner: &mut [Option<End>], open: End, a: End, b: End) {
     let (join, leave) = if a % 2 == open % 2 { (b, a) } else { (a, b) };
     (partner[open], partner[join]) = (Some(join), Some(open));

@@ -4,8 +4,8 @@ use drawing::{Point, Stroke};
 
 use crate::{Cost, Options, distance};
 
-/// The effect of [`optimize`](crate::optimize). Travel is pen-up motion: from the start to the first
-/// stroke, between strokes, and from the last stroke to the park position.
+/// The effect of [`optimize`](crate::optimize). Travel is pen-up motion: from the start to the
+/// first stroke, between strokes, and from the last stroke to the park position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
     /// Number of strokes in the input.

@@ -1,4 +1,4 @@
-//! What ordering promises: the same ink, by the same pens, never dearer; and what it should find.
+//! Ordering keeps the ink and the pens, never increases the cost, and finds known optima.
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Segment, Span, Stroke, Vec2};
 use ordering::{Options, Report, distance, optimize};
@@ -20,7 +20,8 @@ fn plain() -> Options {
     Options { merge: false, effort: 1, ..Options::default() }
 }
 
-/// A piece with its pen, the same in both directions: a quarter and three quarters of the way, and its ends, to 1 nm.
+/// Segments with their pens, equal in both directions: points at t = 0, 1/4, 3/4, 1, rounded to 1
+/// nm.
 fn pieces(strokes: &[Stroke]) -> Vec<(u16, [[i64; 2]; 4])> {
     let mut pieces = Vec::new();
     for stroke in strokes {
@@ -44,7 +45,7 @@ fn dots(strokes: &[Stroke]) -> Vec<(u16, [u64; 2])> {
     dots
 }
 
-/// Points on a coarse grid, so that ends meet, strokes coincide and close.
+/// Points on a coarse grid, so that ends touch, strokes coincide, and strokes are closed.
 fn point() -> impl Strategy<Value = Point> {
     (0..8i32, 0..8i32).prop_map(|(x, y)| Point::new(f64::from(x) * 1.25, f64::from(y) * 1.25))
 }
@@ -81,7 +82,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn the_same_ink_never_dearer_twice_the_same(
+    fn ordering_keeps_ink_never_costs_more_and_is_deterministic(
         strokes in prop::collection::vec(any_stroke(), 0..30),
         options in any_options(),
     ) {
@@ -92,7 +93,7 @@ proptest! {
         prop_assert_eq!(&ordered, &again);
         prop_assert_eq!(report, report_again);
 
-        // Each pen is taken once, in the order in which the file takes them.
+        // Each pen is taken once, in the order of its first stroke in the file.
         let mut pens: Vec<Pen> = ordered.iter().map(|stroke| stroke.pen).collect();
         pens.dedup();
         let mut in_file: Vec<Pen> = Vec::new();
@@ -103,7 +104,7 @@ proptest! {
         }
         prop_assert_eq!(&pens, &in_file);
 
-        // Never dearer than the file's order with the pens put together.
+        // Never more than in file order with the pens grouped.
         let mut together = strokes;
         together.sort_by_key(|stroke| in_file.iter().position(|&pen| pen == stroke.pen));
         let mut from = options.start;
@@ -119,7 +120,7 @@ proptest! {
     }
 
     #[test]
-    fn directions_are_kept(strokes in prop::collection::vec(any_stroke(), 0..30), merge: bool) {
+    fn keep_direction_keeps_directions(strokes in prop::collection::vec(any_stroke(), 0..30), merge: bool) {
         let options = Options { keep_direction: true, effort: 1, merge, ..Options::default() };
         let directed = |strokes: &[Stroke]| {
             let mut all = Vec::new();
@@ -136,9 +137,9 @@ proptest! {
         prop_assert_eq!(directed(&ordered), directed(&strokes));
     }
 
-    /// Euler: a connected component with 2k > 0 odd points takes k trails, one without takes one.
+    /// Euler: a connected component with 2k > 0 odd points takes k trails; without odd points, one.
     #[test]
-    fn merging_leaves_the_fewest_strokes(
+    fn merging_reaches_eulers_minimum(
         lines in prop::collection::vec((0..4u8, 0..4u8, 0..4u8, 0..4u8), 1..24),
     ) {
         let at = |x: u8, y: u8| usize::from(x) * 4 + usize::from(y);
@@ -160,7 +161,7 @@ proptest! {
             let odd = members.iter().filter(|&&p| degree[p] % 2 == 1).count();
             fewest += if members.is_empty() { 0 } else { (odd / 2).max(1) };
         }
-        // A cost that never objects: merging is not undone for the travel it may cost.
+        // With a constant cost merging is never undone because of travel.
         let free = |_: Point, _: Point| 0.0;
         let (merged, report) = optimize(Drawing { strokes: strokes.clone() }, &free, &Options::default());
         prop_assert_eq!(merged.strokes.len(), fewest);
@@ -169,7 +170,7 @@ proptest! {
     }
 
     #[test]
-    fn duplicates_leave_the_same_set_of_pieces(strokes in prop::collection::vec(any_stroke(), 0..40)) {
+    fn dedupe_keeps_the_set_of_segments(strokes in prop::collection::vec(any_stroke(), 0..40)) {
         let options = Options { dedupe: true, merge: false, effort: 0, ..Options::default() };
         let doubled: Vec<Stroke> = strokes.iter().cloned().chain(strokes.iter().cloned().map(|mut stroke| {
             stroke.reverse();
@@ -187,7 +188,7 @@ proptest! {
 }
 
 #[test]
-fn nothing_and_little() {
+fn empty_and_tiny_drawings() {
     assert_eq!(order(vec![], &Options::default()), (vec![], Report::default()));
     for strokes in [
         vec![stroke(1, &[(1.0, 1.0)])],
@@ -203,7 +204,7 @@ fn nothing_and_little() {
 }
 
 #[test]
-fn a_thousand_coincident_dots_and_strokes_take_no_time_and_stay() {
+fn coincident_dots_and_strokes_are_kept() {
     let mut strokes = vec![stroke(1, &[(3.0, 3.0)]); 3000];
     strokes.extend(vec![stroke(1, &[(3.0, 3.0), (4.0, 4.0)]); 3000]);
     let (ordered, report) = order(strokes, &plain());
@@ -212,7 +213,7 @@ fn a_thousand_coincident_dots_and_strokes_take_no_time_and_stay() {
 }
 
 #[test]
-fn starts_near_the_start_and_ends_near_the_park_position() {
+fn start_and_park_position_count() {
     let strokes: Vec<Stroke> =
         [4.0, 0.0, 3.0, 1.0, 2.0].iter().map(|&x| stroke(1, &[(x, 0.0), (x + 0.5, 0.0)])).collect();
     let right = Some(Point::new(10.0, 0.0));
@@ -220,14 +221,14 @@ fn starts_near_the_start_and_ends_near_the_park_position() {
     let (ordered, report) = order(strokes.clone(), &Options { start: right, park: left, ..plain() });
     assert_eq!(ordered[0].start(), Point::new(4.5, 0.0));
     assert!((report.travel_mm_after - (5.5 + 4.0 * 0.5 + 1.0)).abs() < 1e-9, "{report:?}");
-    // Strokes that may not be reversed go the other way, and come back.
+    // Without reversal the strokes are drawn left to right.
     let options = Options { start: right, park: left, keep_direction: true, ..plain() };
     let (ordered, _) = order(strokes, &options);
     assert!(ordered.iter().all(|stroke| stroke.end().x > stroke.start().x));
 }
 
 #[test]
-fn pens_come_in_the_order_asked_for() {
+fn pen_order_is_followed() {
     let strokes =
         (0..12u16).map(|k| stroke(1 + k % 3, &[(f64::from(k), 0.0), (f64::from(k), 1.0)])).collect();
     let options = Options { pen_order: Some(vec![Pen(3), Pen(9), Pen(1)]), ..plain() };
@@ -237,7 +238,7 @@ fn pens_come_in_the_order_asked_for() {
 }
 
 #[test]
-fn a_closed_stroke_begins_where_the_pen_comes_by() {
+fn closed_stroke_starts_at_the_nearest_vertex() {
     let square = stroke(1, &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0), (0.0, 0.0)]);
     let line = stroke(1, &[(9.0, 4.0), (5.0, 4.0)]);
     let (ordered, report) = order(vec![square, line], &plain());
@@ -247,7 +248,7 @@ fn a_closed_stroke_begins_where_the_pen_comes_by() {
 }
 
 #[test]
-fn crossing_strokes_are_joined_straight_through() {
+fn crossing_strokes_are_merged_straight() {
     let strokes = vec![
         stroke(1, &[(0.0, 0.0), (1.0, 0.0)]),
         stroke(1, &[(1.0, 0.0), (1.0, 1.0)]),
@@ -264,7 +265,7 @@ fn crossing_strokes_are_joined_straight_through() {
 }
 
 #[test]
-fn joined_ends_need_not_be_equal_to_the_last_bit_and_arcs_stay_arcs() {
+fn merging_tolerates_rounding_and_keeps_arcs() {
     let mut arc = Stroke::new(Pen(1), Point::new(2.0, 0.0), Span { start: 10, end: 20 });
     let quarter = std::f64::consts::FRAC_PI_2;
     let (a, b) = (Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0));
@@ -277,7 +278,7 @@ fn joined_ends_need_not_be_equal_to_the_last_bit_and_arcs_stay_arcs() {
 }
 
 #[test]
-fn overdrawn_strokes_are_removed_when_asked() {
+fn dedupe_removes_duplicate_strokes_and_dots() {
     let strokes = vec![
         stroke(1, &[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]),
         stroke(1, &[(1.0, 1.0), (1.0, 0.0)]),
@@ -291,9 +292,9 @@ fn overdrawn_strokes_are_removed_when_asked() {
     assert_eq!((report.duplicates_removed, ordered.len()), (2, 4));
 }
 
-/// Exchanging links of equal length once left a stretch behind and the tour in pieces: the search went on for ever.
+/// Regression: an exchange of links of equal length split the tour, and the search did not end.
 #[test]
-fn a_hatch_of_equal_lines_is_drawn_to_and_fro() {
+fn hatch_of_equal_lines_is_drawn_back_and_forth() {
     let heights = (0..100).map(|i| f64::from((i * 37) % 100));
     let strokes = heights.map(|y| stroke(1, &[(0.0, y), (30.0, y)])).collect();
     let (_, report) = order(strokes, &Options { merge: false, ..Options::default() });
@@ -301,16 +302,16 @@ fn a_hatch_of_equal_lines_is_drawn_to_and_fro() {
 }
 
 #[test]
-fn a_cost_that_is_not_a_number_changes_nothing() {
+fn nan_cost_keeps_file_order() {
     let strokes: Vec<Stroke> = [5.0, 1.0, 3.0].iter().map(|&x| stroke(1, &[(x, 0.0), (x, 1.0)])).collect();
     let nan = |_: Point, _: Point| f64::NAN;
     let (ordered, _) = optimize(Drawing { strokes: strokes.clone() }, &nan, &plain());
     assert_eq!(ordered.strokes, strokes);
 }
 
-/// A circle of one arc that begins on its far side.
+/// A circle of one arc that starts at its far side in the file.
 #[test]
-fn circles_begin_where_that_is_cheapest() {
+fn circle_starts_at_the_cheapest_point() {
     let center = Point::new(100.0, 0.0);
     let arc = EllipticArc::circular(center, 10.0, 0.0, std::f64::consts::TAU);
     let mut circle = Stroke::new(Pen(1), arc.eval(0.0), Span { start: 7, end: 9 });

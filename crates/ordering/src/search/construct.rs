@@ -1,12 +1,12 @@
-//! Tours to start from: nearest neighbour and greedy edge.
+//! Initial tours: nearest neighbour and greedy edge.
 
 use super::problem::{End, Problem, mate};
 use super::tree::Tree;
 
 const UNLINKED: End = End::MAX;
 
-/// The trees an end finds its partners in: all ends, or for strokes that may not be reversed those of the other
-/// parity.
+/// Search trees for partners of an end: all ends, or ends of the other parity if strokes may not be
+/// reversed.
 pub(crate) struct Partners {
     trees: Vec<Tree>,
     one_way: bool,
@@ -35,9 +35,9 @@ impl Partners {
     }
 }
 
-/// From the depot always to the nearest end (in the plane) of a stroke not yet drawn. Best on hatches.
+/// From the depot, always to the nearest end (in the plane) of an undrawn stroke. Best on hatches.
 ///
-/// When the start is free, it starts with the first stroke of the file.
+/// If the start is free, the tour starts with the first stroke of the file.
 pub(crate) fn nearest_neighbour(problem: &Problem) -> Vec<End> {
     let ends: Vec<End> = (2..problem.end_count() as End).collect();
     let mut partners = Partners::new(problem, &ends);
@@ -60,15 +60,16 @@ pub(crate) fn nearest_neighbour(problem: &Problem) -> Vec<End> {
     tour
 }
 
-/// The cheapest moves first, as long as they close no circle. Best on lettering and scattered strokes.
+/// Takes the cheapest links first, if they close no cycle. Best on lettering and scattered strokes.
 ///
-/// Candidates are the ends nearest in the plane; what is joined becomes one stroke, and the ends that are left over
-/// look for candidates among themselves, until one is left. Every round at the least joins the cheapest candidate.
+/// Candidates are the nearest ends in the plane. Linked strokes become one fragment; the open ends
+/// of the fragments are the points of the next round, until one fragment is left. Every round
+/// accepts at least the cheapest candidate.
 pub(crate) fn greedy_edge(problem: &Problem) -> Vec<End> {
     const CANDIDATES: usize = 6;
     let count = problem.end_count() as End;
     let mut link = vec![UNLINKED; count as usize];
-    // The other end of the fragment that an open end belongs to.
+    // For each open end the other end of its fragment.
     let mut opposite: Vec<End> = (0..count).map(mate).collect();
     let mut found = Vec::with_capacity(CANDIDATES);
     loop {
@@ -97,10 +98,12 @@ pub(crate) fn greedy_edge(problem: &Problem) -> Vec<End> {
     }
 }
 
-/// Walks the fragments into a tour: one is left, or two when the depot has no place and the joining passed it by.
+/// Closes the fragments to a tour: one fragment, or two if the depot is not placed and was never
+/// linked.
 fn close(problem: &Problem, link: &mut [End], opposite: &[End]) -> Vec<End> {
     let open: Vec<End> = (0..link.len() as End).filter(|&end| link[end as usize] == UNLINKED).collect();
-    // `one_way`: the last fragment begins with an even end and ends with an odd one, as the depot does.
+    // `one_way`: the last fragment begins with an even end and ends with an odd one, like the
+    // depot.
     if let Some(&first) = open.iter().find(|&&end| end > 1 && (!problem.one_way || end % 2 == 0)) {
         let last = opposite[first as usize];
         let (leave, arrive) = if last < 2 || open.len() == 2 { (last, first) } else { (1, first) };

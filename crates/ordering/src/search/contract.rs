@@ -1,19 +1,20 @@
-//! Smaller problems out of a tour: runs of strokes contracted into one.
+//! Contraction: runs of strokes of a tour become single strokes of a smaller problem.
 
 use super::problem::{End, Problem, mate};
 
-/// A problem whose strokes are runs of strokes of another one's tour.
+/// A problem whose strokes are runs of strokes of a tour of another problem.
 pub(crate) struct Contracted<'p> {
     pub(crate) problem: Problem<'p>,
     parent: &'p Problem<'p>,
-    /// The tour that was cut into runs; it begins with the depot, which stays for itself.
+    /// The tour that was cut into runs. It begins with the depot, which is a run of its own.
     tour: Vec<End>,
-    /// Where the runs begin in `tour`: run `r` is `tour[begin[r]..begin[r + 1]]`.
+    /// Run `r` is `tour[begin[r]..begin[r + 1]]`.
     begin: Vec<usize>,
 }
 
 impl<'p> Contracted<'p> {
-    /// Cuts a tour, which begins with the depot, at its dearest links: so many in a thousand are contracted.
+    /// Contracts the cheapest `contracted` per mille of the links of a tour that begins with the
+    /// depot.
     pub(crate) fn new(parent: &'p Problem<'p>, tour: Vec<End>, contracted: usize) -> Self {
         let costs: Vec<f64> = tour.windows(2).map(|pair| parent.cost(mate(pair[0]), pair[1])).collect();
         let mut sorted = costs.clone();
@@ -30,9 +31,9 @@ impl<'p> Contracted<'p> {
         Self { problem, parent, tour, begin }
     }
 
-    /// Turns every stroke of a run, and says by how much that makes the run itself dearer.
+    /// Reverses every stroke of a run, and returns the increase of the run's inner cost.
     ///
-    /// A hatch that is drawn to and fro costs the same then, but begins and ends at its other corners.
+    /// A hatch drawn back and forth then costs the same, but begins and ends at its other corners.
     pub(crate) fn mirror(&mut self, run: usize) -> f64 {
         let inner = |strokes: &[End]| -> f64 {
             strokes.windows(2).map(|pair| self.parent.cost(mate(pair[0]), pair[1])).sum()
@@ -47,12 +48,12 @@ impl<'p> Contracted<'p> {
         inner(strokes) - before
     }
 
-    /// Whether a run is more than a stroke.
+    /// Whether a run has more than one stroke.
     pub(crate) fn is_contracted(&self, run: usize) -> bool {
         self.begin[run + 1] - self.begin[run] > 1
     }
 
-    /// The tour of all strokes that a tour of the runs stands for.
+    /// The tour of the parent's strokes for a tour of the runs.
     pub(crate) fn expand(&self, tour: &[End]) -> Vec<End> {
         let mut strokes = Vec::with_capacity(self.tour.len());
         for &entry in tour {

@@ -1,4 +1,5 @@
-//! Better tours: exchanges of two and three links in Lin and Kernighan's manner, and kicks to get out of the next dead end.
+//! Local search: 2-opt and 3-opt moves with the gain criterion of Lin and Kernighan, and
+//! perturbations (kicks) to leave local optima.
 
 use std::collections::VecDeque;
 
@@ -7,45 +8,47 @@ use super::problem::{End, Problem, mate};
 use super::random::Random;
 use super::tour::{MOST_LINKS, Tour};
 
-/// How many ends, nearest in the plane, an end may be linked to.
+/// Number of candidates of an end: the nearest ends in the plane.
 const CANDIDATES: usize = 10;
 
-/// How many of them are followed to a third link, the most promising first.
+/// Number of candidates that are extended to a third link, the most promising first.
 const BREADTH: usize = 8;
 
-/// A kick exchanges two neighbouring stretches of up to so many strokes, one of these bounds or the other. Short ones
-/// do better where there are many strokes for the effort, long ones where there are few.
+/// A kick exchanges two neighbouring segments of the tour. One of these bounds on their length is
+/// drawn at random: short segments do better with little work a stroke, long ones with much.
 const KICKS: [usize; 2] = [5, 50];
 
-/// A kick that makes the tour dearer is still accepted at the beginning, by up to this many times what the mean link
-/// costs more than the cheapest; the bound falls to nothing at the end (threshold accepting, Dueck and Scheuer 1990,
-/// with a random share of the bound).
+/// Threshold accepting (Dueck and Scheuer 1990): a kick that increases the cost is accepted up to
+/// this multiple of (mean link cost - cheapest link cost), times a random share. The threshold
+/// falls to 0 at the end.
 const TOLERANCE: f64 = 2.0;
 
-/// A tour and all that is needed to improve it.
+/// State of the local search.
 pub(crate) struct Search<'p> {
     problem: &'p Problem<'p>,
     tour: Tour,
     /// The cost of the link at each end.
     link_cost: Vec<f64>,
-    /// The old costs of links since the last commit.
+    /// Overwritten link costs since the last commit, for undo.
     changed: Vec<(End, f64)>,
-    /// Candidates of each end and their costs, cheapest first; those of end `e` are at `first[e]..first[e + 1]`.
+    /// Candidates of each end with their costs, cheapest first; those of end `e` are at
+    /// `first[e]..first[e + 1]`.
     candidates: Vec<(f64, End)>,
     first: Vec<u32>,
-    /// Ends at which something has changed.
+    /// Ends whose links have changed.
     queue: VecDeque<End>,
     queued: Vec<bool>,
-    /// The exchange under construction: `(0,1), (2,3), …` go, `(1,2), (3,4), …, (last,0)` come.
+    /// The exchange under construction: links `(0,1), (2,3), …` are removed, `(1,2), (3,4), …,
+    /// (last,0)` are added.
     ends: [End; 2 * MOST_LINKS],
-    /// The cost of the whole tour at first.
+    /// The cost of the initial tour.
     total: f64,
-    /// What has been done, in candidates looked at: the measure of effort.
+    /// Work done: number of candidates evaluated.
     work: u64,
 }
 
 impl<'p> Search<'p> {
-    /// What `new` does for an end, in candidates looked at.
+    /// Work of `new` an end.
     const WORK_OF_END: u64 = 40;
 
     pub(crate) fn new(problem: &'p Problem<'p>, tour: Vec<End>) -> Self {
@@ -86,12 +89,12 @@ impl<'p> Search<'p> {
         search
     }
 
-    /// What has been done, in candidates looked at.
+    /// Work done: number of candidates evaluated.
     pub(crate) fn work(&self) -> u64 {
         self.work
     }
 
-    /// Exchanges links until no exchange is found that gains.
+    /// Descends to a local optimum.
     pub(crate) fn descend(&mut self) {
         for place in 0..self.tour.len() {
             for end in self.tour.link_before(place) {
@@ -102,22 +105,22 @@ impl<'p> Search<'p> {
         }
     }
 
-    /// Kicks the tour until so many more candidates have been looked at, and each time keeps what comes of it unless
-    /// that is too much worse.
+    /// Perturbs and re-optimizes the tour until `work` more candidates have been evaluated. A
+    /// result that is worse than the threshold allows is undone.
     ///
-    /// A kick is a double bridge of short stretches at a random place (Martin, Otto and Felten 1991; the local form:
-    /// Applegate, Cook and Rohe 2003); the search goes on from its ends alone.
+    /// A kick is a double bridge of short segments at a random position (Martin, Otto and Felten
+    /// 1991; local form: Applegate, Cook and Rohe 2003). The search continues at its six ends only.
     pub(crate) fn kick(&mut self, work: u64, random: &mut Random) {
         let n = self.tour.len();
         if n < 4 {
             return;
         }
-        // What every move costs alike, a lift and a drop, says nothing about how much moves differ.
+        // A constant part of all costs (lift and drop) must not raise the threshold.
         let cheapest = self.candidates.iter().map(|&(cost, _)| cost).fold(f64::INFINITY, f64::min);
         let tolerance = TOLERANCE * (self.total / n as f64 - cheapest).max(0.0);
         let begin = self.work;
         while self.work - begin < work {
-            // Should nothing else be there to do, kicking itself is.
+            // The kick itself is work too, so that the loop ends.
             self.work += 10;
             let left = 1.0 - (self.work - begin) as f64 / work as f64;
             let loss = tolerance * left.max(0.0) * random.share();
@@ -161,29 +164,30 @@ impl<'p> Search<'p> {
         }
     }
 
-    /// Gains below this are rounding errors: sums of gains are sums of links, and those are within the whole tour.
+    /// Gains below this are rounding errors: gains are differences of sums of links, which are
+    /// below the cost of the tour.
     fn least_gain(&self) -> f64 {
         1e-12 * self.total
     }
 
-    /// Improves at the ends in the queue until it is empty; the gain of it all.
+    /// Improves at the queued ends until the queue is empty; returns the total gain.
     fn settle(&mut self) -> f64 {
         let mut total = 0.0;
         while let Some(end) = self.queue.pop_front() {
             self.queued[end as usize] = false;
             self.ends[0] = end;
             self.ends[1] = self.tour.link(end);
-            // An exchange puts its ends into the queue, `end` among them.
+            // An exchange enqueues its ends, `end` among them.
             total += self.improve_at().unwrap_or(0.0);
         }
         total
     }
 
-    /// Carries out the first exchange found that begins with the link `(ends[0], ends[1])` and gains, of two links or
-    /// of three; says how much it gains.
+    /// Applies the first improving exchange of two or three links that removes the link
+    /// `(ends[0], ends[1])`; returns its gain.
     fn improve_at(&mut self) -> Option<f64> {
         let begin = self.link_cost[self.ends[0] as usize];
-        // The most promising first: the gain when the new link is added and the one that must go for it is gone.
+        // Sorted by the gain after the first added link and the second removed link, largest first.
         let mut steps = [(0.0, 0, 0); CANDIDATES];
         let mut count = 0;
         for at in self.candidates_of(self.ends[1]) {
@@ -218,7 +222,7 @@ impl<'p> Search<'p> {
         None
     }
 
-    /// The same for a third link, when taking out two and adding the one between them gains so much.
+    /// Tries a third link; `before` is the gain after two removed links and one added link.
     fn improve_with_third(&mut self, before: f64) -> Option<f64> {
         for at in self.candidates_of(self.ends[3]) {
             let (cost, next) = self.candidates[at];
@@ -241,12 +245,13 @@ impl<'p> Search<'p> {
         None
     }
 
-    /// Where the candidates of an end are.
+    /// The index range of the candidates of an end.
     fn candidates_of(&self, end: End) -> std::ops::Range<usize> {
         self.first[end as usize] as usize..self.first[end as usize + 1] as usize
     }
 
-    /// Exchanges the first `count` links in `ends`, and says what it gains; nothing if it would not give one tour.
+    /// Exchanges the first `count` links in `ends` and returns the gain; `None` if the result would
+    /// not be one tour.
     fn exchange(&mut self, count: usize) -> Option<f64> {
         let ends = self.ends;
         let ends = &ends[..2 * count];

@@ -1,4 +1,4 @@
-//! The search for a short tour.
+//! The search for a short tour (a travelling salesman problem over stroke ends).
 
 mod construct;
 mod contract;
@@ -15,18 +15,19 @@ use orient::orient;
 pub(crate) use problem::{End, Problem};
 use random::Random;
 
-/// The levels of the search: how many links of a thousand are contracted, cheapest first, and how many parts of the work
-/// in a thousand are done on what is left. Nothing contracted is not nothing done: strokes that are near then have numbers
-/// that are near, and what is looked at together is together in memory.
+/// The levels of the search: per mille of the links that are contracted, cheapest first, and per
+/// mille of the work spent on that level. A level without contraction still renumbers the strokes
+/// in tour order, so that near strokes are near in memory.
 const LEVELS: [(usize, u64); 6] = [(0, 900), (500, 13), (750, 13), (900, 12), (950, 12), (0, 0)];
 
-/// The level whose runs are mirrored, and with how many parts of the work in a thousand.
+/// The level on which runs are mirrored, and per mille of the work spent on that.
 const MIRRORED: (usize, u64) = (950, 50);
 
-/// Up to this many strokes, the search is done from every start, and shares the work.
+/// Up to this number of strokes every start is searched from; they share the work.
 const SEVERAL_STARTS: usize = 3000;
 
-/// The best tour found from several starts, the file's own order among them: never worse than that.
+/// The best tour found from several starts. File order is one of them, so the result is never
+/// worse.
 pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize)) -> Vec<End> {
     let starts =
         [problem.file_order(), construct::nearest_neighbour(problem), construct::greedy_edge(problem)];
@@ -49,7 +50,7 @@ pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize)) -> Vec<End> {
     best.tour
 }
 
-/// How many candidates may be looked at.
+/// The budget: number of candidates to evaluate.
 fn work_of(strokes: usize, effort: u8) -> u64 {
     let n = strokes as u64;
     let default = 50_000 * n.min(1000) + 4500 * n.min(10_000) + 600 * n;
@@ -61,7 +62,7 @@ fn work_of(strokes: usize, effort: u8) -> u64 {
     }
 }
 
-/// A tour, and the best of those it was compared with.
+/// The best tour offered.
 struct Best<'p> {
     problem: &'p Problem<'p>,
     tour: Vec<End>,
@@ -82,10 +83,11 @@ impl<'p> Best<'p> {
     }
 }
 
-/// Improves a tour on one level after another, most of all on the strokes themselves.
+/// Improves a tour level by level; most of the work is spent on the level of single strokes.
 ///
-/// Gluing what is near (multilevel refinement, Walshaw 2002) is what finds the way from hatch to hatch: the right
-/// partner of an end at the edge of a hatch is never among the nearest, which all are of the same hatch.
+/// Contraction (multilevel refinement, Walshaw 2002) finds the links between hatches: the right
+/// partner of an end at the edge of a hatch is not among its nearest ends, which all belong to the
+/// same hatch.
 fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
     let mut random = Random::new();
     let mut best = Best::new(problem, tour);
@@ -105,7 +107,7 @@ fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
     best.tour
 }
 
-/// Mirrors one run after another, and keeps what is better when the order of the runs has adapted to it.
+/// Mirrors random runs, re-optimizes the order of the runs, and keeps improvements.
 fn mirror(level: &mut Contracted, tour: Vec<End>, work: u64, random: &mut Random) -> Vec<End> {
     let runs = level.problem.stroke_count();
     let contracted: Vec<usize> = (1..runs).filter(|&run| level.is_contracted(run)).collect();
@@ -114,13 +116,13 @@ fn mirror(level: &mut Contracted, tour: Vec<End>, work: u64, random: &mut Random
     while done < work && !contracted.is_empty() {
         let run = contracted[random.below(contracted.len())];
         let before = level.problem.tour_cost(&best);
-        let dearer = level.mirror(run);
+        let increase = level.mirror(run);
         let mut search = Search::new(&level.problem, best.clone());
         search.descend();
         search.kick(20 * runs as u64, random);
         done += search.work();
         let tour = search.finish();
-        if level.problem.tour_cost(&tour) + dearer <= before {
+        if level.problem.tour_cost(&tour) + increase <= before {
             best = tour;
         } else {
             level.mirror(run);

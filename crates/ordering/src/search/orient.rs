@@ -1,16 +1,17 @@
-//! The best directions for strokes whose order is settled.
+//! Optimal directions of strokes in a fixed order.
 
 use super::problem::{End, Problem, mate};
 
-/// Turns strokes so that the tour, which begins with the depot, costs the least that it can in this order.
+/// Chooses the direction of each stroke so that the tour, which begins with the depot, has the
+/// lowest cost in this order.
 ///
-/// Dynamic programming over the strokes with two states each. It mirrors whole hatches, drawn to and fro, in one
-/// step, where exchanges of links would have to turn every line of them by itself.
+/// Dynamic programming over the strokes with two states each. It mirrors a whole hatch, drawn back
+/// and forth, in one step, where exchanges of links would have to reverse each of its lines.
 pub(crate) fn orient(problem: &Problem, tour: &mut [End]) {
     if problem.one_way || tour.len() < 2 {
         return;
     }
-    // For each stroke and each way to enter it, the way in which the stroke before it is entered.
+    // For each stroke and direction the best direction of the stroke before it.
     let mut before = vec![[false; 2]; tour.len()];
     let mut best = [0.0, f64::INFINITY];
     for place in 1..tour.len() {

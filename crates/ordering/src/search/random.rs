@@ -1,6 +1,6 @@
-//! Where to kick: numbers that look random and are the same every time.
+//! Deterministic pseudorandom numbers.
 
-/// Vigna's xorshift64* (2016): 64 bits of state, enough to choose places with.
+/// Vigna's xorshift64* (2016) with a fixed seed.
 pub(crate) struct Random(u64);
 
 impl Random {
@@ -8,7 +8,7 @@ impl Random {
         Self(0x9E37_79B9_7F4A_7C15)
     }
 
-    /// A number below `bound`, which is less than 2^32 and not 0.
+    /// A number below `bound`, which is from 1 to 2^32 - 1.
     pub(crate) fn below(&mut self, bound: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -17,7 +17,7 @@ impl Random {
         ((high * bound as u64) >> 32) as usize
     }
 
-    /// A number from 0 to 1, 1 excluded.
+    /// A number in [0, 1).
     pub(crate) fn share(&mut self) -> f64 {
         self.below(1 << 30) as f64 / (1u64 << 30) as f64
     }

@@ -1,21 +1,21 @@
-//! A closed tour in an array, and the exchange of any few of its links.
+//! A closed tour in an array, with exchanges of two or three links.
 
 use super::problem::{End, Problem, mate};
 
-/// The most links that one move exchanges.
+/// The largest number of links that a move exchanges.
 pub(crate) const MOST_LINKS: usize = 3;
 
 /// Strokes in the order they are visited, each given by the end at which it is entered.
 pub(crate) struct Tour {
     entries: Vec<End>,
-    /// Where each stroke stands in `entries`.
+    /// The index of each stroke in `entries`.
     place: Vec<u32>,
-    /// What moves overwrote since the last `commit`: first place and length, contents in `saved`.
+    /// Overwritten ranges since the last `commit` (first index and length); contents in `saved`.
     log: Vec<(u32, u32)>,
     saved: Vec<End>,
 }
 
-/// A stretch of the tour between two links that are taken out.
+/// A part of the tour between two removed links.
 #[derive(Clone, Copy, Default)]
 struct Stretch {
     first: usize,
@@ -23,7 +23,7 @@ struct Stretch {
     forward: bool,
 }
 
-/// The stretches of a tour in the order and the directions of another tour.
+/// The stretches of a tour in the order and directions of the new tour.
 pub(crate) struct Plan {
     stretches: [Stretch; MOST_LINKS],
     count: usize,
@@ -46,33 +46,35 @@ impl Tour {
         if place >= self.entries.len() { place - self.entries.len() } else { place }
     }
 
-    /// The place of the stroke that follows the link at `end`, and whether `end` is where that stroke is entered.
+    /// The index of the stroke after the link at `end`, and whether `end` is the entry of that
+    /// stroke.
     fn gap(&self, end: End) -> (usize, bool) {
         let at = self.place[end as usize / 2] as usize;
         if self.entries[at] == end { (at, true) } else { (self.wrap(at + 1), false) }
     }
 
-    /// The ends of the link before the stroke at a place: left and entered.
+    /// The ends of the link before the stroke at an index: the end left and the end entered.
     pub(crate) fn link_before(&self, place: usize) -> [End; 2] {
         let before = if place == 0 { self.entries.len() - 1 } else { place - 1 };
         [mate(self.entries[before]), self.entries[place]]
     }
 
-    /// The end at the other side of the pen-up move at `end`.
+    /// The other end of the link (pen-up move) at `end`.
     pub(crate) fn link(&self, end: End) -> End {
         let (gap, entered) = self.gap(end);
         let [left, right] = self.link_before(gap);
         if entered { left } else { right }
     }
 
-    /// What becomes of the tour when the links `(e0,e1), (e2,e3), …` are replaced by `(e1,e2), …, (e_last,e0)`;
-    /// nothing if that is not one tour.
+    /// The tour after replacing the links `(e0,e1), (e2,e3), …` by `(e1,e2), …, (e_last,e0)`;
+    /// `None` if the result is not one tour.
     ///
-    /// Links sorted by place cut the tour into as many stretches; following the new links from stretch to stretch
-    /// must visit them all (Helsgaun 2009, section 5.1: the test costs the number of links, not that of strokes).
+    /// The removed links, sorted by index, cut the tour into stretches. Following the new links
+    /// must visit all stretches (Helsgaun 2009, section 5.1: the cost of the test depends on the
+    /// number of links, not of strokes).
     pub(crate) fn reconnect(&self, ends: &[End]) -> Option<Plan> {
         let count = ends.len() / 2;
-        // (place, index in `ends` of the link's right end), by place.
+        // (index in the tour, index in `ends` of the right end of the link), sorted.
         let mut cuts = [(0, 0); MOST_LINKS];
         for link in 0..count {
             let (gap, entered) = self.gap(ends[2 * link]);
@@ -108,8 +110,8 @@ impl Tour {
         None
     }
 
-    /// Carries a plan out. The longest stretch stays where it is, whatever its direction; the others are rewritten:
-    /// so many strokes.
+    /// Applies a plan. The longest stretch stays in place, in either direction; the others are
+    /// rewritten. Returns the number of strokes rewritten.
     pub(crate) fn apply(&mut self, plan: &Plan) -> usize {
         let mut stretches = plan.stretches;
         let stretches = &mut stretches[..plan.count];
@@ -150,7 +152,7 @@ impl Tour {
         length
     }
 
-    /// Forgets how to undo.
+    /// Makes the moves since the last `commit` permanent.
     pub(crate) fn commit(&mut self) {
         self.log.clear();
         self.saved.clear();
@@ -171,7 +173,7 @@ impl Tour {
         }
     }
 
-    /// The tour, beginning with the depot as [`Problem::canonical`] has it.
+    /// The tour in the form of [`Problem::canonical`].
     pub(crate) fn finish(mut self) -> Vec<End> {
         Problem::canonical(&mut self.entries);
         self.entries
@@ -195,7 +197,7 @@ mod tests {
         links
     }
 
-    /// How many strokes one meets following links from stroke 0.
+    /// The number of strokes on the cycle through stroke 0.
     fn circuit(links: &[End]) -> usize {
         let (mut end, mut count) = (0, 0);
         loop {
@@ -208,9 +210,9 @@ mod tests {
     }
 
     proptest! {
-        /// Two stretches of equal length, one turned and one not, once were taken for each other.
+        /// Regression: two stretches of equal length, one of them reversed, were once confused.
         #[test]
-        fn an_exchange_makes_the_tour_that_its_links_say(
+        fn exchange_produces_the_requested_links(
             order in Just((0..9).collect::<Vec<End>>()).prop_shuffle(),
             sides in prop::collection::vec(0..2u32, 9),
             cuts in Just((0..9).collect::<Vec<usize>>()).prop_shuffle(),

@@ -1,7 +1,8 @@
-//! Nearest ends in the plane: a k-d tree (Bentley 1975, 1990), static, with deletion by counting.
+//! Nearest ends in the plane: a static k-d tree with deletion (Bentley 1975, 1990).
 //!
-//! A tree rather than a grid because drawings are clustered: small lettering in the corner of a large sheet, a
-//! thousand strokes through one point. Its depth depends on the number of points alone.
+//! A tree instead of a grid, because drawings are clustered: small lettering in the corner of a
+//! large sheet, a thousand strokes through one point. The depth depends on the number of points
+//! only.
 
 use drawing::Point;
 
@@ -27,11 +28,11 @@ impl Node {
     }
 }
 
-/// The ends that may be asked for, in boxes within boxes; node `i` has the children `2i` and `2i + 1`.
+/// A k-d tree of ends; node `i` has the children `2i` and `2i + 1`.
 pub(crate) struct Tree {
     nodes: Vec<Node>,
     items: Vec<(End, Point)>,
-    /// The place of an end in `items`, or `u32::MAX`.
+    /// The index of each end in `items`, or `u32::MAX`.
     place: Vec<u32>,
 }
 
@@ -54,7 +55,7 @@ impl Tree {
         Self { nodes, items, place }
     }
 
-    /// Takes an end out; those that are not in the tree are ignored.
+    /// Removes an end; ends that are not in the tree are ignored.
     pub(crate) fn remove(&mut self, end: End) {
         let at = std::mem::replace(&mut self.place[end as usize], u32::MAX);
         if at == u32::MAX {
@@ -70,7 +71,8 @@ impl Tree {
         }
     }
 
-    /// The `count` ends nearest to `p` but for two, nearest first, as (square of the distance, end).
+    /// The `count` ends nearest to `p`, except the two in `but`, nearest first, as
+    /// (squared distance, end).
     pub(crate) fn nearest(&self, p: Point, count: usize, but: [End; 2], found: &mut Vec<(f64, End)>) {
         found.clear();
         if count > 0 {
@@ -129,7 +131,7 @@ fn build(nodes: &mut [Node], items: &mut [(End, Point)], index: usize, first: us
         high,
     };
     if items.len() <= LEAF {
-        // The order in which the partition left them is the standard library's affair.
+        // The order after the partition is not specified by the standard library.
         items.sort_unstable_by_key(|&(end, _)| end);
         return;
     }
