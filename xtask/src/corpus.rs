@@ -1,4 +1,5 @@
-//! Every drawing below a folder through the release binary: `check`, and `convert --fit` on two machines.
+//! Runs the release binary over every drawing below a folder: `check`, and `convert --fit` on two
+//! machines.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,28 +9,27 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
-/// How long one run may take,
+/// Time limit of one run.
 const LIMIT: Duration = Duration::from_secs(10);
 
-/// and how much longer for each kilometre of ink: with six kilometres, a plan takes two days to draw.
+/// Additional time for each kilometre of ink: a plan of six kilometres takes two days to draw.
 const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(30);
 const MACHINES: [&str; 2] = ["coaxial", "polar"];
 const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 
-/// What came of one run of the binary.
+/// The result of one run of the binary.
 #[derive(Debug)]
 struct Run {
-    /// Nothing when it had to be stopped.
+    /// `None` if it was stopped at the time limit.
     exit: Option<i32>,
-    /// What it wrote to standard error and to standard output.
-    said: String,
-    answered: String,
+    stderr: String,
+    stdout: String,
     /// Whether it left an output file.
     wrote: bool,
     seconds: f64,
 }
 
-/// Prints a table and a summary; true if nothing failed.
+/// Prints a table and a summary; true if no run failed.
 pub(crate) fn run(folder: &Path) -> Result<bool> {
     let mut drawings = Vec::new();
     find(folder, &mut drawings)?;
@@ -94,19 +94,19 @@ pub(crate) fn build() -> Result<PathBuf> {
         .output()
         .context("cannot run cargo")?;
     anyhow::ensure!(built.status.success(), "the release build failed");
-    // Cargo says where the binary is, whatever the target folder.
+    // Cargo's messages name the binary, for any target folder.
     let executable = String::from_utf8_lossy(&built.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
         .filter(|message| message["target"]["name"] == "plotplan")
         .find_map(|message| message["executable"].as_str().map(PathBuf::from));
-    executable.context("cargo did not say where the binary is")
+    executable.context("cargo did not report the path of the binary")
 }
 
-/// One row of the table, and whether all of it is as it should be.
+/// One row of the table, and whether all runs passed.
 fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(String, bool)> {
     let check = start(binary, &["check".as_ref(), drawing.as_os_str()], output, LIMIT)?;
-    let limit = LIMIT + LIMIT_A_KILOMETRE.mul_f64(kilometres(&check.answered));
+    let limit = LIMIT + LIMIT_A_KILOMETRE.mul_f64(kilometres(&check.stdout));
     let mut faults: Vec<String> = judge_check(&check).into_iter().collect();
     let mut results = Vec::new();
     for machine in MACHINES {
@@ -142,9 +142,9 @@ fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(S
     Ok((text, faults.is_empty()))
 }
 
-/// The ink that `check` tells of, km: "... 6764.26 m of ink ...".
-fn kilometres(answer: &str) -> f64 {
-    let words: Vec<&str> = answer.split_whitespace().collect();
+/// The length of ink in the output of `check`, km: "... 6764.26 m of ink ...".
+fn kilometres(output: &str) -> f64 {
+    let words: Vec<&str> = output.split_whitespace().collect();
     let ink = words.windows(4).find(|four| four[1..] == ["m", "of", "ink"]);
     ink.and_then(|four| four[0].parse::<f64>().ok()).map_or(0.0, |metres| metres / 1000.0)
 }
@@ -152,13 +152,13 @@ fn kilometres(answer: &str) -> f64 {
 /// Runs the binary and stops it after `limit`.
 fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Duration) -> Result<Run> {
     let _ = std::fs::remove_file(output);
-    let (said, answered) = (output.with_extension("stderr"), output.with_extension("stdout"));
+    let (stderr, stdout) = (output.with_extension("stderr"), output.with_extension("stdout"));
     let began = Instant::now();
     let mut child = Command::new(binary)
         .args(arguments)
         .stdin(Stdio::null())
-        .stdout(std::fs::File::create(&answered)?)
-        .stderr(std::fs::File::create(&said)?)
+        .stdout(std::fs::File::create(&stdout)?)
+        .stderr(std::fs::File::create(&stderr)?)
         .spawn()
         .context("cannot start the binary")?;
     let status = loop {
@@ -173,22 +173,22 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Du
         std::thread::sleep(Duration::from_millis(5));
     };
     Ok(Run {
-        // A signal has no code: told apart from every exit code.
+        // A signal has no exit code: -1, which is not a code either.
         exit: status.map(|status| status.code().unwrap_or(-1)),
-        said: String::from_utf8_lossy(&std::fs::read(&said)?).into_owned(),
-        answered: String::from_utf8_lossy(&std::fs::read(&answered)?).into_owned(),
+        stderr: String::from_utf8_lossy(&std::fs::read(&stderr)?).into_owned(),
+        stdout: String::from_utf8_lossy(&std::fs::read(&stdout)?).into_owned(),
         wrote: output.exists(),
         seconds: began.elapsed().as_secs_f64(),
     })
 }
 
-/// What is wrong with a run whatever it was asked.
+/// A fault that no run may have, whatever its arguments.
 fn broken(run: &Run) -> Option<String> {
-    if run.said.contains("panicked at") {
+    if run.stderr.contains("panicked at") {
         return Some("it panicked".into());
     }
     match run.exit {
-        None => Some(format!("not done after {:.0} s", run.seconds)),
+        None => Some(format!("not finished after {:.0} s", run.seconds)),
         Some(0 | 1) => None,
         Some(code) => Some(format!("exit {code}")),
     }
@@ -198,28 +198,28 @@ fn judge_check(run: &Run) -> Option<String> {
     broken(run).map(|fault| format!("check: {fault}"))
 }
 
-/// "planned", or why it was refused; an error where it did neither properly.
+/// "planned", or the reason for a refusal; an error if it did neither.
 fn judge_convert(run: &Run) -> Result<String, String> {
     if let Some(fault) = broken(run) {
         return Err(fault);
     }
     if run.exit == Some(1) {
         if run.wrote {
-            return Err("refused, and yet there is an output file".into());
+            return Err("refused, but there is an output file".into());
         }
-        let reason = run.said.lines().rev().find(|line| line.starts_with("error"));
-        let reason = reason.ok_or("refused without an error that says why")?;
+        let reason = run.stderr.lines().rev().find(|line| line.starts_with("error"));
+        let reason = reason.ok_or("refused without an error message")?;
         return Ok(format!("refused: {}", reason.chars().take(60).collect::<String>()));
     }
     let report =
-        run.said.lines().last().and_then(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+        run.stderr.lines().last().and_then(|line| serde_json::from_str::<serde_json::Value>(line).ok());
     let report = report.ok_or("the last line of standard error is no JSON object")?;
     match (&report["certificate"]["holds"], run.wrote) {
         (serde_json::Value::Bool(true), true) => {
             Ok(format!("planned {:.0} s", report["summary"]["duration_s"].as_f64().unwrap_or(f64::NAN)))
         }
-        (serde_json::Value::Bool(true), false) => Err("planned, and yet there is no output file".into()),
-        _ => Err("a plan whose certificate does not hold".into()),
+        (serde_json::Value::Bool(true), false) => Err("planned, but there is no output file".into()),
+        _ => Err("a plan that failed verification".into()),
     }
 }
 
@@ -227,8 +227,8 @@ fn judge_convert(run: &Run) -> Result<String, String> {
 mod tests {
     use super::*;
 
-    fn run(exit: Option<i32>, said: &str, wrote: bool) -> Run {
-        Run { exit, said: said.into(), answered: String::new(), wrote, seconds: 0.1 }
+    fn run(exit: Option<i32>, stderr: &str, wrote: bool) -> Run {
+        Run { exit, stderr: stderr.into(), stdout: String::new(), wrote, seconds: 0.1 }
     }
 
     #[test]
@@ -241,20 +241,20 @@ mod tests {
     }
 
     #[test]
-    fn ink_is_read_off_what_check_says() {
+    fn kilometres_of_ink_in_check_output() {
         assert_eq!(kilometres("x: 3 commands\n5 strokes, 6764.26 m of ink from"), 6.764_26);
         assert_eq!(kilometres("5 strokes, 12.5 mm of ink from"), 0.0);
     }
 
     #[test]
-    fn refusals_need_a_reason_and_no_file() {
+    fn refusals_need_an_error_message_and_no_file() {
         assert!(judge_convert(&run(Some(1), "error: the drawing has no ink", false)).is_ok());
         assert!(judge_convert(&run(Some(1), "error: the drawing has no ink", true)).is_err());
         assert!(judge_convert(&run(Some(1), "", false)).is_err());
     }
 
     #[test]
-    fn panics_hangs_and_other_exits_fail() {
+    fn panics_timeouts_and_other_exit_codes_fail() {
         assert!(judge_check(&run(Some(101), "thread 'main' panicked at x", false)).is_some());
         assert!(judge_check(&run(None, "", false)).is_some());
         assert!(judge_check(&run(Some(-1), "", false)).is_some());

@@ -1,4 +1,5 @@
-//! What ordering brings: on the benchmark's drawings beside its references, and on real drawings in plan time.
+//! Benchmarks of stroke ordering: travel on generated drawings compared with references, and plan
+//! durations on real drawings.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 
-/// Drawings of the generator with the travel (mm) that issue 5 asks for, vpype's `--two-opt` and LKH's, where known.
+/// Generated drawings: target travel, travel of vpype `--two-opt` and of LKH where known, mm.
 const REFERENCES: [(&str, f64, Option<f64>, Option<f64>); 9] = [
     ("text_1k", 5000.0, Some(5475.0), Some(4954.5)),
     ("hatch_1k", 1370.0, Some(1392.0), Some(1317.8)),
@@ -19,7 +20,7 @@ const REFERENCES: [(&str, f64, Option<f64>, Option<f64>); 9] = [
     ("flow_100k", 53_000.0, None, None),
 ];
 
-/// Makes the benchmark's drawings with the generator (a Python script that needs numpy) and orders them; true if every
+/// Runs the generator (a Python script that needs numpy) and orders its drawings; true if every
 /// target is met.
 pub(crate) fn bench(generator: &Path) -> Result<bool> {
     let work = tempfile::tempdir()?;
@@ -40,27 +41,37 @@ pub(crate) fn bench(generator: &Path) -> Result<bool> {
     let mut met = true;
     for (name, target, vpype, lkh) in REFERENCES {
         let run = Command::new(&cargo)
-            .args(["run", "--quiet", "--release", "--package", "ordering", "--example", "bench_order", "--"])
+            .args([
+                "run",
+                "--quiet",
+                "--release",
+                "--package",
+                "plotplan-ordering",
+                "--example",
+                "bench_order",
+                "--",
+            ])
             .arg(work.path().join(format!("{name}.hpgl")))
             .current_dir(crate::top())
             .output()
             .context("cannot run cargo")?;
         anyhow::ensure!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-        let said = String::from_utf8_lossy(&run.stdout).trim().to_owned();
+        let output = String::from_utf8_lossy(&run.stdout).trim().to_owned();
         let shown = |known: Option<f64>| known.map_or("-".into(), |mm| format!("{mm}"));
-        println!("{said}\n    target {target}, vpype --two-opt {}, LKH {}", shown(vpype), shown(lkh));
-        // It takes minutes for 100,000 strokes.
+        println!("{output}\n    target {target}, vpype --two-opt {}, LKH {}", shown(vpype), shown(lkh));
+        // vpype takes minutes for 100,000 strokes.
         if !name.ends_with("100k")
             && let Some((mm, seconds)) = self::vpype(&binary, &work.path().join(format!("{name}.hpgl")))
         {
             println!("    vpype --two-opt on this machine: {mm:.1} mm in {seconds:.1} s");
         }
-        met &= travel_of(&said).is_some_and(|mm| mm <= target);
+        met &= travel_of(&output).is_some_and(|mm| mm <= target);
     }
     Ok(met)
 }
 
-/// vpype's own travel (mm) and how long it takes (s); nothing where it is not installed. Its lengths are in CSS pixels.
+/// The travel (mm) and the run time (s) of vpype; `None` if it is not installed. vpype reports
+/// lengths in CSS pixels.
 fn vpype(plotplan: &Path, drawing: &Path) -> Option<(f64, f64)> {
     let svg = drawing.with_extension("svg");
     let made =
@@ -72,19 +83,20 @@ fn vpype(plotplan: &Path, drawing: &Path) -> Option<(f64, f64)> {
     let run =
         Command::new("vpype").arg("read").arg(&svg).args(["linesort", "--two-opt", "stat"]).output().ok()?;
     let seconds = started.elapsed().as_secs_f64();
-    let said = String::from_utf8_lossy(&run.stdout);
-    let pixels = said.lines().rev().find_map(|line| line.trim().strip_prefix("Pen-up length:"))?;
+    let output = String::from_utf8_lossy(&run.stdout);
+    let pixels = output.lines().rev().find_map(|line| line.trim().strip_prefix("Pen-up length:"))?;
     Some((pixels.trim().parse::<f64>().ok()? * 25.4 / 96.0, seconds))
 }
 
-/// The last of the numbers followed by "mm" in what the example says.
-fn travel_of(said: &str) -> Option<f64> {
-    let words: Vec<&str> = said.split_whitespace().collect();
+/// The last number followed by "mm" in the output of the example.
+fn travel_of(output: &str) -> Option<f64> {
+    let words: Vec<&str> = output.split_whitespace().collect();
     let before_unit = words.windows(2).filter(|pair| pair[1].starts_with("mm"));
     before_unit.filter_map(|pair| pair[0].parse().ok()).next_back()
 }
 
-/// Plans every drawing below a folder in the file's order and in ours, on two machines, and prints the times as a table.
+/// Plans every drawing below a folder in file order and in optimized order, on two machines, and
+/// prints a table of durations; true if no plan takes more than 0.5 s longer.
 pub(crate) fn real(folder: &Path) -> Result<bool> {
     let binary = crate::corpus::build()?;
     let mut drawings: Vec<PathBuf> = Vec::new();
@@ -108,14 +120,14 @@ pub(crate) fn real(folder: &Path) -> Result<bool> {
     }
     for (machine, [before, after]) in ["coaxial", "corexy"].into_iter().zip(sums) {
         println!(
-            "all on {machine}: {before:.0} s in the file's order, {after:.0} s in ours, {:.1} % less",
+            "all on {machine}: {before:.0} s in file order, {after:.0} s in optimized order, {:.1} % less",
             100.0 * (1.0 - after / before)
         );
     }
     Ok(never_worse)
 }
 
-/// The plan's duration, s; nothing if the drawing cannot be planned.
+/// The duration of the plan, s; `None` if the drawing cannot be planned.
 fn duration(binary: &Path, drawing: &Path, machine: &str, order: &str) -> Option<f64> {
     let run = Command::new(binary)
         .arg("convert")
@@ -124,8 +136,8 @@ fn duration(binary: &Path, drawing: &Path, machine: &str, order: &str) -> Option
         .arg(if cfg!(windows) { "NUL" } else { "/dev/null" })
         .output()
         .ok()?;
-    let said = String::from_utf8_lossy(&run.stderr);
-    let report: serde_json::Value = serde_json::from_str(said.lines().last()?).ok()?;
+    let stderr = String::from_utf8_lossy(&run.stderr);
+    let report: serde_json::Value = serde_json::from_str(stderr.lines().last()?).ok()?;
     report["summary"]["duration_s"].as_f64()
 }
 

@@ -1,4 +1,4 @@
-//! `cargo xtask peers`: what we read of drawings beside what hp2xx reads of them, file by file.
+//! `cargo xtask peers`: compares our drawings with those of hp2xx, file by file.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,15 +10,16 @@ use drawing::Point;
 use rstar::primitives::Line;
 use rstar::{PointDistance as _, RTree};
 
-/// Lengths that differ by more than this need a note.
+/// Relative difference in length that needs a note.
 const ALIKE: f64 = 0.005;
-/// Shapes further apart than this (mm) are told apart in the summary.
+/// Hausdorff distance up to which the summary counts shapes as equal, mm.
 const NEAR_MM: f64 = 0.05;
-/// hp2xx writes chords of 5 degrees; ours are much nearer to the arcs than theirs.
+/// Chord error of our flattening, mm; far below that of hp2xx, which writes chords of 5 degrees.
 const CHORD_MM: f64 = 0.001;
 const PLOTTER_UNIT_MM: f64 = 0.025;
 const LIMIT: Duration = Duration::from_secs(60);
-/// Distances are measured from so many places at the most, evenly along all ink, and from the ends of as many lines.
+/// Largest number of samples a distance is measured from: uniform along all ink, and as many line
+/// ends.
 const MOST_SAMPLES: f64 = 20_000.0;
 const FINEST_STEP_MM: f64 = 0.02;
 
@@ -26,20 +27,20 @@ const NOTES: &str = include_str!("peers.toml");
 
 type Polylines = Vec<Vec<Point>>;
 
-/// Why a file is read differently, and by whom rightly.
+/// The reason for a difference, and which of the two programs is right.
 struct Note {
     right: String,
     why: String,
 }
 
-/// One file read twice.
+/// The result for one file.
 struct Row {
     name: String,
     ours_mm: f64,
-    /// Nothing where hp2xx gives the file up.
+    /// `None` if hp2xx fails.
     theirs_mm: Option<f64>,
     apart_mm: Option<f64>,
-    /// It has text or fills, which no two readers draw alike.
+    /// Whether it has text or fills, which no two readers draw alike.
     text_or_fill: bool,
 }
 
@@ -50,10 +51,11 @@ impl Row {
     }
 }
 
-/// Compares all drawings below the folders, and our own; true if every difference in length has a note.
+/// Compares all drawings below the folders and our own; true if every difference in length has a
+/// note.
 pub(crate) fn run(folders: &[PathBuf]) -> Result<bool> {
     if Command::new("hp2xx").arg("-q").stdin(Stdio::null()).output().is_err() {
-        println!("hp2xx is not installed: nothing to compare with");
+        println!("skipped: hp2xx is not installed");
         return Ok(true);
     }
     let notes = notes()?;
@@ -89,7 +91,7 @@ pub(crate) fn run(folders: &[PathBuf]) -> Result<bool> {
                 println!("    right: {}. {}", note.right, note.why);
             }
             if why.is_none() {
-                println!("    NO NOTE says who is right");
+                println!("    NO NOTE in peers.toml");
                 unexplained += 1;
             }
         }
@@ -105,8 +107,8 @@ fn summary(rows: &[Row]) {
         let mine: Vec<&Row> = rows.iter().filter(|row| row.text_or_fill != plain).collect();
         let count = |holds: &dyn Fn(&Row) -> bool| mine.iter().filter(|row| holds(row)).count();
         println!(
-            "{} files {title}: {} within 0.1 % in length, {} within 0.5 %, {} of them within {NEAR_MM} mm in shape; hp2xx \
-             gave up {}",
+            "{} files {title}: {} within 0.1 % in length, {} within 0.5 %, {} of them within \
+             {NEAR_MM} mm in shape; hp2xx failed on {}",
             mine.len(),
             count(&|row| row.alike(0.001)),
             count(&|row| row.alike(ALIKE)),
@@ -116,7 +118,7 @@ fn summary(rows: &[Row]) {
     }
 }
 
-/// The notes of every file: the reasons that peers.toml gives for it.
+/// The notes of every file: the reasons listed for it in peers.toml.
 fn notes() -> Result<BTreeMap<String, Vec<Note>>> {
     let table: toml::Table = NOTES.parse().context("peers.toml")?;
     let part = |name: &str| {
@@ -161,7 +163,7 @@ fn compare(file: &Path, work: &Path) -> Result<Row> {
     Ok(row)
 }
 
-/// What hp2xx makes of a file, as HP-GL in plotter units at its true size; nothing where it fails.
+/// The output of hp2xx for a file, as HP-GL in plotter units at true size; `None` if it fails.
 fn hp2xx(file: &Path, work: &Path) -> Result<Option<String>> {
     let output = work.join("hp2xx.hpgl");
     let _ = std::fs::remove_file(&output);
@@ -189,7 +191,7 @@ fn hp2xx(file: &Path, work: &Path) -> Result<Option<String>> {
     Ok(std::fs::read(&output).ok().filter(|_| done).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
 }
 
-/// The polylines in what hp2xx writes: `PUx,y;PDx,y;...`, absolute.
+/// The polylines in the output of hp2xx: `PUx,y;PDx,y;...`, absolute.
 fn polylines(text: &str) -> Polylines {
     let mut lines: Polylines = Vec::new();
     let mut at: Option<Point> = None;
@@ -223,7 +225,7 @@ fn length(lines: &[Vec<Point>]) -> f64 {
     lines.iter().flat_map(|line| line.windows(2)).map(|pair| (pair[1] - pair[0]).hypot()).sum()
 }
 
-/// Moves the lower left corner of the bounds to the origin: hp2xx does not keep it where it is.
+/// Moves the lower left corner of the bounding box to the origin: hp2xx does not keep its position.
 fn to_origin(lines: &mut Polylines) {
     let points = || lines.iter().flatten();
     let x = points().map(|p| p.x).fold(f64::INFINITY, f64::min);
@@ -233,16 +235,17 @@ fn to_origin(lines: &mut Polylines) {
     }
 }
 
-/// The Hausdorff distance, from samples on both sides; nothing if a side is empty or not finite.
+/// The Hausdorff distance, from samples on both sides; `None` if a side is empty or not finite.
 fn distance(a: &[Vec<Point>], b: &[Vec<Point>]) -> Option<f64> {
     let one = farthest(a, &index(b))?;
     Some(one.max(farthest(b, &index(a))?))
 }
 
-/// The lines of a drawing; dots are left out, because hp2xx keeps only some, as lines of rounding errors.
+/// The lines of a drawing, without dots: hp2xx keeps only some of those, as lines of the length of
+/// a rounding error.
 fn pieces(lines: &[Vec<Point>]) -> impl Iterator<Item = (Point, Point)> + '_ {
     let ends = lines.iter().flat_map(|line| line.windows(2)).map(|pair| (pair[0], pair[1]));
-    // Nor has a line without length a distance in rstar (0 / 0).
+    // rstar has no distance to a line of length 0 (0 / 0).
     ends.filter(|(a, b)| (*b - *a).hypot() > CHORD_MM)
 }
 
@@ -257,7 +260,7 @@ fn farthest(lines: &[Vec<Point>], to: &RTree<Line<[f64; 2]>>) -> Option<f64> {
     }
     let every = pieces(lines).count() / MOST_SAMPLES as usize + 1;
     let mut farthest = 0.0_f64;
-    // How far on the next sample lies.
+    // Distance to the next sample.
     let mut next = 0.0;
     for (number, (from, end)) in pieces(lines).enumerate() {
         let length = (end - from).hypot();
@@ -285,14 +288,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_hp2xx_writes_is_read() {
+    fn polylines_of_hp2xx_output() {
         let lines = polylines("SP1;PA;PU0.000000,0.000000;PD400.000000,0.0;PD400.0,400.0;PA;PU40,40;PD40,0;");
         assert_eq!(lines.len(), 2);
         assert!((length(&lines) - 21.0).abs() < 1e-12);
     }
 
     #[test]
-    fn distances_are_those_of_the_far_side() {
+    fn distance_is_symmetric_hausdorff() {
         let line = |y: f64| vec![vec![Point::new(0.0, y), Point::new(10.0, y)]];
         let mut two = line(0.0);
         two.extend(line(3.0));
@@ -304,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn every_note_says_who_is_right() {
+    fn every_note_names_the_right_program() {
         for (file, notes) in notes().unwrap() {
             assert!(!notes.is_empty(), "{file}");
             assert!(notes.iter().all(|note| note.right == "plotplan" || note.right == "both"), "{file}");
