@@ -1,4 +1,4 @@
-//! The program as people and scripts meet it: every command, its words, its exit codes, and what it leaves behind.
+//! The command line: output, exit codes and files of every command.
 
 use std::fs;
 use std::io::Read as _;
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 /// A line with a corner, a circle, a line of a second pen, a dot: 30 mm x 25 mm, within reach of every preset.
 const TINY: &str = "IN;SP1;\nPU400,400;PD1200,400,1200,1000;\nPU800,800;CI200;\nSP2;PU200,1000;PD200,600;\nPU300,900;PD;PU;\nSP0;\n";
-/// A line of half a metre.
+/// A line of 0.5 m.
 const LARGE: &str = "IN;SP1;PU400,400;PD1200,400;PU;PA20000,0;PD;PA400,400;PU;SP0;";
 const TWO_PAGES: &str = "IN;SP1;PU40,40;PD400,40;PU;PG;SP3;PU40,40;PD40,400,800,400;PU;PG;";
 const QUIRKS: &str = "IN;SP1;PU400,400;QQ7;PD800,400;XY1,2;PD400,800,9;PU;LBhello";
@@ -18,24 +18,24 @@ const QUIRKS: &str = "IN;SP1;PU400,400;QQ7;PD800,400;XY1,2;PD400,800,9;PU;LBhell
 const PENS: &str = "IN;SP1;PU400,400;PD1200,400;PU400,400;PD1200,400;SP2;PU400,800;PD1200,800;SP3;VS2;PU400,1200;PD1200,1200;PU;SP0;";
 const PRESETS: [&str; 5] = ["coaxial", "corexy", "hbot", "polar", "cartesian"];
 
-/// A folder with some files, in which the program runs.
-struct Desk {
+/// A temporary working folder of the program.
+struct TestDir {
     folder: TempDir,
 }
 
-impl Desk {
+impl TestDir {
     fn new() -> Self {
-        let desk = Self { folder: TempDir::new().expect("a temporary folder") };
-        desk.put("tiny.hpgl", TINY);
-        desk.put("large.hpgl", LARGE);
-        desk
+        let dir = Self { folder: TempDir::new().expect("a temporary folder") };
+        dir.write("tiny.hpgl", TINY);
+        dir.write("large.hpgl", LARGE);
+        dir
     }
 
     fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    fn put(&self, name: &str, text: &str) {
+    fn write(&self, name: &str, text: &str) {
         fs::write(self.path().join(name), text).expect("a file can be written");
     }
 
@@ -59,44 +59,44 @@ impl Desk {
     fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(cargo_bin!("plotplan"));
         command.current_dir(self.path()).args(arguments.split_whitespace());
-        // The width of help and the use of colour are the terminal's business.
+        // Width and colour must not depend on the terminal.
         command.env("COLUMNS", "100").env_remove("CLICOLOR_FORCE").env_remove("NO_COLOR");
         command
     }
 
-    fn run(&self, arguments: &str) -> Said {
+    fn run(&self, arguments: &str) -> CommandOutput {
         self.run_with(arguments, "")
     }
 
-    fn run_with(&self, arguments: &str, input: &str) -> Said {
+    fn run_with(&self, arguments: &str, input: &str) -> CommandOutput {
         let mut command = assert_cmd::Command::from_std(self.command(arguments));
-        Said::of(command.write_stdin(input).output().expect("the program runs"))
+        CommandOutput::of(command.write_stdin(input).output().expect("the program runs"))
     }
 
-    /// Runs it and gives what it wrote; it has to succeed.
-    fn good(&self, arguments: &str) -> Said {
+    /// Runs the program and returns its output; fails if it does.
+    fn succeed(&self, arguments: &str) -> CommandOutput {
         let said = self.run(arguments);
         assert_eq!(said.code, 0, "plotplan {arguments}\n{}", said.err);
         said
     }
 
-    /// What was said and how it ended, for a snapshot.
+    /// Output and exit code of each command, for a snapshot.
     fn transcript(&self, arguments: &[&str]) -> String {
         let of = |arguments: &&str| {
-            let Said { code, out, err } = self.run(arguments);
+            let CommandOutput { code, out, err } = self.run(arguments);
             format!("$ plotplan {arguments}\n{}{err}[{code}]\n", String::from_utf8_lossy(&out))
         };
         arguments.iter().map(of).collect::<Vec<_>>().join("\n")
     }
 }
 
-struct Said {
+struct CommandOutput {
     code: i32,
     out: Vec<u8>,
     err: String,
 }
 
-impl Said {
+impl CommandOutput {
     fn of(output: Output) -> Self {
         Self {
             code: output.status.code().expect("it ends by itself"),
@@ -112,10 +112,10 @@ impl Said {
 
 #[test]
 fn usage_errors_exit_2() {
-    let desk = Desk::new();
-    desk.put("sped.toml", &desk.good("machine show coaxial").text().replacen("max_speed", "max_sped", 1));
-    desk.put("singular.toml", &desk.good("machine show corexy").text().replacen("[1, -1]", "[2, 2]", 1));
-    let said = desk.transcript(&[
+    let dir = TestDir::new();
+    dir.write("sped.toml", &dir.succeed("machine show coaxial").text().replacen("max_speed", "max_sped", 1));
+    dir.write("singular.toml", &dir.succeed("machine show corexy").text().replacen("[1, -1]", "[2, 2]", 1));
+    let said = dir.transcript(&[
         "convert tiny.hpgl",
         "convert tiny.hpgl --machine coxial",
         "convert tiny.hpgl --machine typewriter",
@@ -147,8 +147,8 @@ fn usage_errors_exit_2() {
 
 #[test]
 fn io_errors_exit_3() {
-    let desk = Desk::new();
-    let before = desk.names();
+    let dir = TestDir::new();
+    let before = dir.names();
     for arguments in [
         "convert nosuch.hpgl --machine coaxial",
         "check nosuch.hpgl",
@@ -163,26 +163,26 @@ fn io_errors_exit_3() {
         "preview tiny.hpgl --output nosuch/x.png",
     ] {
         if arguments.contains("tiny.csv") {
-            desk.good("convert tiny.hpgl --machine cartesian --format csv --output tiny.csv");
+            dir.succeed("convert tiny.hpgl --machine cartesian --format csv --output tiny.csv");
         }
-        let said = desk.run(arguments);
+        let said = dir.run(arguments);
         assert_eq!(said.code, 3, "plotplan {arguments}\n{}", said.err);
         assert!(said.err.starts_with("error: cannot ") && said.err.contains("nosuch"), "{}", said.err);
         assert!(!said.err.contains(".plotplan-"), "names a temporary file: {}", said.err);
         assert!(said.out.is_empty());
-        let _ = fs::remove_file(desk.path().join("tiny.csv"));
-        assert_eq!(desk.names(), before, "plotplan {arguments} leaves something behind");
+        let _ = fs::remove_file(dir.path().join("tiny.csv"));
+        assert_eq!(dir.names(), before, "plotplan {arguments} leaves something behind");
     }
 }
 
 #[test]
 fn unplannable_drawings_exit_1() {
-    let desk = Desk::new();
-    desk.put("empty.hpgl", "");
-    desk.put("letter.txt", "Dear plotter, please draw a house.\n");
-    desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
-    desk.put("plan.csv", desk.good("convert tiny.hpgl -m cartesian -f csv").text());
-    let said = desk.transcript(&[
+    let dir = TestDir::new();
+    dir.write("empty.hpgl", "");
+    dir.write("letter.txt", "Dear plotter, please draw a house.\n");
+    dir.write("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
+    dir.write("plan.csv", dir.succeed("convert tiny.hpgl -m cartesian -f csv").text());
+    let said = dir.transcript(&[
         "convert empty.hpgl --machine coaxial",
         "convert letter.txt --machine coaxial",
         "convert plan.csv --machine coaxial",
@@ -198,53 +198,53 @@ fn unplannable_drawings_exit_1() {
 
 #[test]
 fn failed_plan_keeps_output_file() {
-    let desk = Desk::new();
-    desk.put("plan.ticks", "as it was");
-    let before = desk.names();
-    let said = desk.run("convert large.hpgl --machine coaxial --output plan.ticks");
+    let dir = TestDir::new();
+    dir.write("plan.ticks", "as it was");
+    let before = dir.names();
+    let said = dir.run("convert large.hpgl --machine coaxial --output plan.ticks");
     assert_eq!(said.code, 1);
-    assert_eq!(desk.text("plan.ticks"), "as it was");
-    assert_eq!(desk.names(), before);
-    assert_eq!(desk.run("convert large.hpgl --machine coaxial --output new.ticks").code, 1);
-    assert_eq!(desk.names(), before, "no file is written for a plan that was refused");
-    let said = desk.good("convert large.hpgl --machine coaxial --fit --output plan.ticks");
+    assert_eq!(dir.text("plan.ticks"), "as it was");
+    assert_eq!(dir.names(), before);
+    assert_eq!(dir.run("convert large.hpgl --machine coaxial --output new.ticks").code, 1);
+    assert_eq!(dir.names(), before, "no file is written for a plan that was refused");
+    let said = dir.succeed("convert large.hpgl --machine coaxial --fit --output plan.ticks");
     assert!(said.out.is_empty(), "the plan is in the file, not on standard output");
-    assert!(desk.text("plan.ticks").starts_with("; plotplan: 1\n"));
-    assert_eq!(desk.names(), before);
+    assert!(dir.text("plan.ticks").starts_with("; plotplan: 1\n"));
+    assert_eq!(dir.names(), before);
 }
 
 #[cfg(unix)]
 #[test]
 fn symlink_output_is_preserved() {
-    let desk = Desk::new();
-    desk.put("plan.ticks", "");
-    std::os::unix::fs::symlink("plan.ticks", desk.path().join("link")).expect("a link can be made");
-    desk.good("convert tiny.hpgl --machine coaxial --output link");
-    assert!(desk.path().join("link").is_symlink());
-    assert!(desk.text("plan.ticks").starts_with("; plotplan: 1\n"));
-    // A device is written as it is.
-    desk.good("convert tiny.hpgl --machine coaxial --output /dev/null");
+    let dir = TestDir::new();
+    dir.write("plan.ticks", "");
+    std::os::unix::fs::symlink("plan.ticks", dir.path().join("link")).expect("a link can be made");
+    dir.succeed("convert tiny.hpgl --machine coaxial --output link");
+    assert!(dir.path().join("link").is_symlink());
+    assert!(dir.text("plan.ticks").starts_with("; plotplan: 1\n"));
+    // A device is written to directly.
+    dir.succeed("convert tiny.hpgl --machine coaxial --output /dev/null");
     assert!(!Path::new("/dev/null").is_file());
 }
 
 #[test]
 fn strict_treats_warnings_as_errors() {
-    let desk = Desk::new();
-    desk.put("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
+    let dir = TestDir::new();
+    dir.write("quirk.hpgl", "IN;SP1;PU400,400;QQ7;PD800,400;PU;");
     for command in
         ["convert quirk.hpgl --machine cartesian", "convert quirk.hpgl --format svg", "check quirk.hpgl"]
     {
-        let said = desk.good(command);
+        let said = dir.succeed(command);
         assert!(said.err.contains("warning"), "{}", said.err);
-        let said = desk.run(&format!("{command} --strict"));
+        let said = dir.run(&format!("{command} --strict"));
         assert_eq!(said.code, 1, "plotplan {command} --strict");
         assert!(said.out.is_empty(), "plotplan {command} --strict");
     }
-    desk.good("convert tiny.hpgl --machine cartesian --strict");
-    // Ink beside the sheet is a warning of the machine, not of the file.
+    dir.succeed("convert tiny.hpgl --machine cartesian --strict");
+    // Ink outside the sheet is a warning about the machine, not the file.
     let beside = "check tiny.hpgl --machine coaxial --place -11mm,0";
-    assert!(desk.good(beside).err.contains("ink reaches 6.00 mm beyond the sheet"));
-    let said = desk.run(&format!("{beside} --strict"));
+    assert!(dir.succeed(beside).err.contains("ink reaches 6.00 mm beyond the sheet"));
+    let said = dir.run(&format!("{beside} --strict"));
     assert_eq!(said.code, 1);
     assert!(
         said.err.ends_with("error: there are warnings, and --strict takes them for errors\n"),
@@ -255,16 +255,16 @@ fn strict_treats_warnings_as_errors() {
 
 #[test]
 fn json_report_is_last_line_of_stderr() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for machine in PRESETS {
-        let said = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv --report json"));
+        let said = dir.succeed(&format!("convert tiny.hpgl --machine {machine} --format csv --report json"));
         let last = said.err.lines().last().expect("a line");
         let report: serde_json::Value = serde_json::from_str(last).expect("one JSON object");
         assert_eq!(report["certificate"]["holds"], true, "{machine}");
         assert_eq!(report["certificate"]["pens"], serde_json::json!([1, 2]), "{machine}");
         assert_eq!(report["certificate"]["dots"], 1, "{machine}");
         assert_eq!(report["summary"]["strokes"], 4, "{machine}");
-        // 20 mm + 15 mm, the circle, 10 mm; the pen's path may be shorter by what the tolerance lets it cut.
+        // 20 mm + 15 mm, the circle, 10 mm; blends may shorten the path.
         let ink = report["summary"]["ink_mm"].as_f64().expect("a number");
         let drawn = 45.0 + 10.0 * std::f64::consts::PI;
         assert!(ink > drawn - 1.0 && ink < drawn + 0.1, "{machine}: {ink} of {drawn} mm");
@@ -275,73 +275,74 @@ fn json_report_is_last_line_of_stderr() {
 
 #[test]
 fn dash_is_stdin_and_stdout() {
-    let desk = Desk::new();
-    let from_file = desk.good("convert tiny.hpgl --machine hbot");
-    let piped = desk.run_with("convert - --machine hbot --output -", TINY);
+    let dir = TestDir::new();
+    let from_file = dir.succeed("convert tiny.hpgl --machine hbot");
+    let piped = dir.run_with("convert - --machine hbot --output -", TINY);
     assert_eq!((piped.code, &piped.err), (0, &from_file.err));
     assert_eq!(piped.out, from_file.out);
     let plan = piped.text();
     for reader in ["verify - --drawing tiny.hpgl", "info -", "preview - --output plan.svg"] {
-        let said = desk.run_with(reader, plan);
+        let said = dir.run_with(reader, plan);
         assert_eq!(said.code, 0, "plotplan {reader}\n{}", said.err);
     }
-    assert_eq!(desk.run_with("check -", TINY).code, 0);
-    assert!(desk.text("plan.svg").contains("<svg"));
+    assert_eq!(dir.run_with("check -", TINY).code, 0);
+    assert!(dir.text("plan.svg").contains("<svg"));
 }
 
 #[test]
 fn plans_are_deterministic() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for format in ["ticks", "csv", "json", "hpgl", "svg"] {
         let command = format!("convert tiny.hpgl --machine polar --format {format}");
-        let (first, second) = (desk.good(&command), desk.good(&format!("{command} --output out")));
-        assert_eq!(first.out, desk.bytes("out"), "{format}");
+        let (first, second) = (dir.succeed(&command), dir.succeed(&format!("{command} --output out")));
+        assert_eq!(first.out, dir.bytes("out"), "{format}");
         assert_eq!(first.err, second.err, "{format}");
-        // Where the drawing lies is not part of the plan.
-        let absolute = desk.path().join("tiny.hpgl").display().to_string();
-        assert_eq!(desk.good(&command.replace("tiny.hpgl", &absolute)).out, first.out, "{format}");
+        // The path of the input file is not part of the plan.
+        let absolute = dir.path().join("tiny.hpgl").display().to_string();
+        assert_eq!(dir.succeed(&command.replace("tiny.hpgl", &absolute)).out, first.out, "{format}");
     }
 }
 
 #[test]
 fn closed_stdout_exits_quietly() {
-    let desk = Desk::new();
-    // More than a pipe holds, so that the program has to notice.
+    let dir = TestDir::new();
+    // More than the buffer of a pipe, so that a write fails.
     let command = "convert tiny.hpgl --machine cartesian --fit --period 1ms";
-    assert!(desk.good(command).out.len() > 200_000);
-    let mut program = desk.command(command);
+    assert!(dir.succeed(command).out.len() > 200_000);
+    let mut program = dir.command(command);
     let mut child = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
     let mut out = child.stdout.take().expect("a pipe");
     let mut some = [0; 100];
     out.read_exact(&mut some).expect("the plan's beginning");
     assert!(some.starts_with(b"; plotplan: 1\n"));
     drop(out);
-    let Said { code, err, .. } = Said::of(child.wait_with_output().expect("it ends"));
+    let CommandOutput { code, err, .. } = CommandOutput::of(child.wait_with_output().expect("it ends"));
     assert_eq!((code, err.as_str()), (0, ""));
 }
 
 #[test]
 fn drawing_formats_need_no_machine() {
-    let desk = Desk::new();
-    desk.good("convert tiny.hpgl --format hpgl --output clean.hpgl");
-    let clean = desk.text("clean.hpgl");
+    let dir = TestDir::new();
+    dir.succeed("convert tiny.hpgl --format hpgl --output clean.hpgl");
+    let clean = dir.text("clean.hpgl");
     insta::assert_snapshot!("tiny_as_hpgl", clean);
-    let again = desk.good("convert clean.hpgl --format hpgl");
+    let again = dir.succeed("convert clean.hpgl --format hpgl");
     assert_eq!(again.text(), clean, "what was written plainly is written the same again");
-    let svg = desk.good("convert tiny.hpgl --format svg");
+    let svg = dir.succeed("convert tiny.hpgl --format svg");
     insta::assert_snapshot!("tiny_as_svg", svg.text());
 }
 
 #[test]
 fn shown_machine_file_gives_same_plan() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for machine in PRESETS {
-        let shown = desk.good(&format!("machine show {machine}"));
-        desk.put("mine.toml", shown.text());
-        assert_eq!(desk.good("machine show mine.toml").out, shown.out, "{machine}");
+        let shown = dir.succeed(&format!("machine show {machine}"));
+        dir.write("mine.toml", shown.text());
+        assert_eq!(dir.succeed("machine show mine.toml").out, shown.out, "{machine}");
         for format in ["csv", "json"] {
-            let plan =
-                |name: &str| desk.good(&format!("convert tiny.hpgl --machine {name} --format {format}")).out;
+            let plan = |name: &str| {
+                dir.succeed(&format!("convert tiny.hpgl --machine {name} --format {format}")).out
+            };
             assert_eq!(plan("mine.toml"), plan(machine), "{machine}, {format}");
         }
     }
@@ -349,48 +350,48 @@ fn shown_machine_file_gives_same_plan() {
 
 #[test]
 fn machine_list_and_check() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let checks = PRESETS.map(|machine| format!("machine check {machine}"));
     let mut commands = vec!["machine list"];
     commands.extend(checks.iter().map(String::as_str));
-    let said = desk.transcript(&commands);
+    let said = dir.transcript(&commands);
     insta::assert_snapshot!(said);
 }
 
 #[test]
 fn verify_needs_file_of_custom_machine() {
-    let desk = Desk::new();
-    let mine = desk.good("machine show coaxial").text().replacen("\"coaxial\"", "\"mine\"", 1);
-    desk.put("mine.toml", &mine.replacen("\"206mm\"", "\"200mm\"", 1));
+    let dir = TestDir::new();
+    let mine = dir.succeed("machine show coaxial").text().replacen("\"coaxial\"", "\"mine\"", 1);
+    dir.write("mine.toml", &mine.replacen("\"206mm\"", "\"200mm\"", 1));
     for format in ["ticks", "csv", "json"] {
-        desk.good(&format!("convert tiny.hpgl --machine mine.toml --format {format} --output plan"));
-        let alone = desk.run("verify plan --drawing tiny.hpgl");
+        dir.succeed(&format!("convert tiny.hpgl --machine mine.toml --format {format} --output plan"));
+        let alone = dir.run("verify plan --drawing tiny.hpgl");
         if format == "json" {
             assert_eq!(alone.code, 0, "a plan document has its machine in it\n{}", alone.err);
         } else {
             assert_eq!(alone.code, 2, "{}", alone.err);
             assert!(alone.err.contains("there is no machine called mine"), "{}", alone.err);
         }
-        desk.good("verify plan --drawing tiny.hpgl --machine mine.toml");
-        // On another arm the same ticks draw something else.
-        assert_eq!(desk.run("verify plan --drawing tiny.hpgl --machine coaxial").code, 1);
+        dir.succeed("verify plan --drawing tiny.hpgl --machine mine.toml");
+        // The same ticks draw something else on another arm.
+        assert_eq!(dir.run("verify plan --drawing tiny.hpgl --machine coaxial").code, 1);
     }
 }
 
 #[test]
 fn verify_reads_every_plan_format() {
-    let desk = Desk::new();
-    desk.put("other.hpgl", &TINY.replacen("PD200,600", "PD200,640", 1));
+    let dir = TestDir::new();
+    dir.write("other.hpgl", &TINY.replacen("PD200,600", "PD200,640", 1));
     for machine in PRESETS {
         for format in ["ticks", "csv", "json"] {
-            desk.good(&format!("convert tiny.hpgl --machine {machine} --format {format} --output plan"));
-            let said = desk.good("verify plan --drawing tiny.hpgl");
+            dir.succeed(&format!("convert tiny.hpgl --machine {machine} --format {format} --output plan"));
+            let said = dir.succeed("verify plan --drawing tiny.hpgl");
             assert!(said.text().starts_with("certificate holds (tolerance 0.1 mm)\n"), "{}", said.text());
-            let said = desk.good("verify plan --drawing tiny.hpgl --report json");
+            let said = dir.succeed("verify plan --drawing tiny.hpgl --report json");
             let report: serde_json::Value = serde_json::from_str(said.text()).expect("one JSON object");
             assert_eq!(report["certificate"]["holds"], true);
-            // A line that is 1 mm longer is not drawn by this plan.
-            let said = desk.run("verify plan --drawing other.hpgl");
+            // This plan does not cover a line that is 1 mm longer.
+            let said = dir.run("verify plan --drawing other.hpgl");
             assert_eq!(said.code, 1, "{machine}, {format}");
             assert!(said.text().contains("FAILED"), "{}", said.text());
         }
@@ -399,15 +400,15 @@ fn verify_reads_every_plan_format() {
 
 #[test]
 fn verify_without_drawing_checks_motion() {
-    let desk = Desk::new();
-    desk.good("convert tiny.hpgl --machine polar --format csv --output plan.csv");
-    let said = desk.good("verify plan.csv");
+    let dir = TestDir::new();
+    dir.succeed("convert tiny.hpgl --machine polar --format csv --output plan.csv");
+    let said = dir.succeed("verify plan.csv");
     assert!(said.err.starts_with("warning: without --drawing"), "{}", said.err);
     assert!(said.text().starts_with("motion holds\n"), "{}", said.text());
-    let said = desk.good("verify plan.csv --report json");
+    let said = dir.succeed("verify plan.csv --report json");
     let report: serde_json::Value = serde_json::from_str(said.text()).expect("one JSON object");
     assert_eq!(report["certificate"]["after_rounding"], serde_json::Value::Null);
-    let info = desk.good("info plan.csv");
+    let info = dir.succeed("info plan.csv");
     assert!(info.text().contains("pens     [1, 2], down 4 times\n"), "{}", info.text());
 }
 
@@ -417,7 +418,7 @@ fn rows(csv: &str) -> Vec<Vec<i64>> {
     csv.lines().filter_map(numbers).collect()
 }
 
-/// A CSV plan with one number changed by so much.
+/// A CSV plan with `by` added to one number.
 fn tampered(csv: &str, row: usize, column: usize, by: i64) -> String {
     let mut rows = rows(csv);
     rows[row][column] += by;
@@ -429,9 +430,9 @@ fn tampered(csv: &str, row: usize, column: usize, by: i64) -> String {
 
 #[test]
 fn tampered_plan_fails_verification() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for machine in PRESETS {
-        let plan = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv"));
+        let plan = dir.succeed(&format!("convert tiny.hpgl --machine {machine} --format csv"));
         let csv = plan.text();
         let all = rows(csv);
         assert_eq!(tampered(csv, 0, 2, 0), csv);
@@ -448,8 +449,8 @@ fn tampered_plan_fails_verification() {
             ("a pen", tampered(csv, draws, 1, 1)),
             ("a pen that is up", tampered(csv, travels, 1, 1)),
         ] {
-            desk.put("plan.csv", &changed);
-            let said = desk.run("verify plan.csv --drawing tiny.hpgl");
+            dir.write("plan.csv", &changed);
+            let said = dir.run("verify plan.csv --drawing tiny.hpgl");
             assert_eq!(said.code, 1, "{machine}: {what} was changed\n{}", said.text());
             assert!(said.text().contains("FAILED: "), "{machine}: {what} was changed\n{}", said.text());
         }
@@ -458,14 +459,14 @@ fn tampered_plan_fails_verification() {
 
 #[test]
 fn truncated_plan_is_rejected() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for format in ["ticks", "csv", "json"] {
-        let plan = desk.good(&format!("convert tiny.hpgl --machine corexy --format {format}"));
+        let plan = dir.succeed(&format!("convert tiny.hpgl --machine corexy --format {format}"));
         let text = plan.text();
         let without_last_line = text.trim_end().rfind('\n').map_or(text.len() / 2, |at| at + 1);
         for end in [without_last_line, text.len() / 2] {
-            desk.put("plan", &text[..end]);
-            let said = desk.run("verify plan --drawing tiny.hpgl");
+            dir.write("plan", &text[..end]);
+            let said = dir.run("verify plan --drawing tiny.hpgl");
             assert_eq!(said.code, 1, "{format} up to byte {end} of {}", text.len());
             assert!(said.err.contains("plan is not a plan that can be used"), "{}", said.err);
         }
@@ -474,22 +475,22 @@ fn truncated_plan_is_rejected() {
 
 #[test]
 fn preview_of_drawings_and_plans() {
-    let desk = Desk::new();
-    // A picture shows what leaves the reach, too.
-    desk.good("preview large.hpgl --machine hbot --output large.svg");
-    desk.good("convert tiny.hpgl --machine coaxial --output plan.ticks");
+    let dir = TestDir::new();
+    // A picture also shows ink outside the reach.
+    dir.succeed("preview large.hpgl --machine hbot --output large.svg");
+    dir.succeed("convert tiny.hpgl --machine coaxial --output plan.ticks");
     for source in
         ["tiny.hpgl", "tiny.hpgl --machine polar --fit", "tiny.hpgl --machine coaxial", "plan.ticks"]
     {
-        desk.good(&format!("preview {source} --output x.svg"));
-        let svg = desk.text("x.svg");
+        dir.succeed(&format!("preview {source} --output x.svg"));
+        let svg = dir.text("x.svg");
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"), "{source}: {svg}");
         for part in ["<g id=\"pen1\"", "<g id=\"pen2\"", "id=\"sheet\""] {
             assert!(svg.contains(part), "{source}: no {part}");
         }
         assert_eq!(svg.contains("id=\"start\""), source != "tiny.hpgl", "{source}");
-        desk.good(&format!("preview {source} --output x.PNG"));
-        let png = desk.bytes("x.PNG");
+        dir.succeed(&format!("preview {source} --output x.PNG"));
+        let png = dir.bytes("x.PNG");
         assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"), "{source}");
         let side = |at: usize| u32::from_be_bytes([png[at], png[at + 1], png[at + 2], png[at + 3]]);
         assert_eq!(side(16).max(side(20)), 1600, "{source}");
@@ -498,15 +499,15 @@ fn preview_of_drawings_and_plans() {
 
 #[test]
 fn check_and_info_reports() {
-    let desk = Desk::new();
-    desk.put("quirk.hpgl", QUIRKS);
-    desk.put("two-pages.hpgl", TWO_PAGES);
-    desk.put("nothing.hpgl", "IN;SP1;PU100,100;SP0;");
-    desk.put("lost.hpgl", "IN;SP1;PU0,0;PD400,0,99999999999,0,400,400;PU;");
+    let dir = TestDir::new();
+    dir.write("quirk.hpgl", QUIRKS);
+    dir.write("two-pages.hpgl", TWO_PAGES);
+    dir.write("nothing.hpgl", "IN;SP1;PU100,100;SP0;");
+    dir.write("lost.hpgl", "IN;SP1;PU0,0;PD400,0,99999999999,0,400,400;PU;");
     let job =
         "\x1b%-12345X@PJL ENTER LANGUAGE=HPGL2\n\x1b%-1BBPINPS8400,5940SP1PW.5PU0,0PD400,0PG;\x1b%0A\x1bE";
-    desk.put("job.hpgl", job);
-    let said = desk.transcript(&[
+    dir.write("job.hpgl", job);
+    let said = dir.transcript(&[
         "check tiny.hpgl",
         "check tiny.hpgl --machine polar",
         "check large.hpgl --machine polar",
@@ -526,19 +527,19 @@ fn check_and_info_reports() {
 
 #[test]
 fn page_selection() {
-    let desk = Desk::new();
-    desk.put("two-pages.hpgl", TWO_PAGES);
+    let dir = TestDir::new();
+    dir.write("two-pages.hpgl", TWO_PAGES);
     for (page, pen) in [("", 1), (" --page 1", 1), (" --page 2", 3)] {
-        let said = desk.good(&format!("convert two-pages.hpgl --machine cartesian --format csv{page}"));
+        let said = dir.succeed(&format!("convert two-pages.hpgl --machine cartesian --format csv{page}"));
         assert!(said.err.contains("two-pages.hpgl has 2 pages"), "{}", said.err);
         assert!(rows(said.text()).iter().all(|row| row[1] == 0 || row[1] == pen), "{page}");
-        desk.put("plan.csv", said.text());
-        assert_eq!(desk.run(&format!("verify plan.csv --drawing two-pages.hpgl{page}")).code, 0, "{page}");
+        dir.write("plan.csv", said.text());
+        assert_eq!(dir.run(&format!("verify plan.csv --drawing two-pages.hpgl{page}")).code, 0, "{page}");
         let other = if pen == 1 { 2 } else { 1 };
-        assert_eq!(desk.run(&format!("verify plan.csv --drawing two-pages.hpgl --page {other}")).code, 1);
+        assert_eq!(dir.run(&format!("verify plan.csv --drawing two-pages.hpgl --page {other}")).code, 1);
     }
     for page in [0, 3] {
-        let said = desk.run(&format!("convert two-pages.hpgl --machine cartesian --page {page}"));
+        let said = dir.run(&format!("convert two-pages.hpgl --machine cartesian --page {page}"));
         let expected = format!("error: two-pages.hpgl has 2 pages, not page {page}\n");
         assert!(said.code == 2 && said.err.ends_with(&expected), "{}", said.err);
     }
@@ -546,12 +547,12 @@ fn page_selection() {
 
 #[test]
 fn json_diagnostics() {
-    let desk = Desk::new();
-    desk.put("quirk.hpgl", QUIRKS);
-    let said = desk
+    let dir = TestDir::new();
+    dir.write("quirk.hpgl", QUIRKS);
+    let said = dir
         .transcript(&["check quirk.hpgl --message-format short", "check quirk.hpgl --message-format json"]);
     insta::assert_snapshot!(said);
-    let said = desk.good("convert quirk.hpgl --machine cartesian --message-format json --report json");
+    let said = dir.succeed("convert quirk.hpgl --machine cartesian --message-format json --report json");
     for line in said.err.lines() {
         serde_json::from_str::<serde_json::Value>(line).expect(line);
     }
@@ -559,18 +560,18 @@ fn json_diagnostics() {
 
 #[test]
 fn hpgl_output_in_both_encodings() {
-    let desk = Desk::new();
-    let plain = desk.good("convert tiny.hpgl --format hpgl");
-    desk.good("convert tiny.hpgl --format hpgl --hpgl2 --output encoded.hpgl");
-    assert!(desk.bytes("encoded.hpgl").windows(2).any(|two| two == b"PE"));
-    assert_eq!(desk.good("convert encoded.hpgl --format hpgl").text(), plain.text());
+    let dir = TestDir::new();
+    let plain = dir.succeed("convert tiny.hpgl --format hpgl");
+    dir.succeed("convert tiny.hpgl --format hpgl --hpgl2 --output encoded.hpgl");
+    assert!(dir.bytes("encoded.hpgl").windows(2).any(|two| two == b"PE"));
+    assert_eq!(dir.succeed("convert encoded.hpgl --format hpgl").text(), plain.text());
 }
 
 #[test]
 fn help_man_pages_and_completions() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let said =
-        desk.transcript(&["--help", "convert --help", "machine --help", "explain H0101", "explain plotters"]);
+        dir.transcript(&["--help", "convert --help", "machine --help", "explain H0101", "explain plotters"]);
     insta::assert_snapshot!(said);
     for command in [
         "check",
@@ -585,67 +586,67 @@ fn help_man_pages_and_completions() {
         "explain",
         "man",
     ] {
-        assert!(desk.good(&format!("{command} --help")).text().contains("Usage: plotplan"), "{command}");
+        assert!(dir.succeed(&format!("{command} --help")).text().contains("Usage: plotplan"), "{command}");
     }
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let said = desk.good(&format!("completions {shell}"));
+        let said = dir.succeed(&format!("completions {shell}"));
         assert!(said.text().contains("plotplan") && said.text().contains("tolerance"), "{shell}");
         assert_eq!(said.err, "");
     }
-    let man = desk.good("man");
+    let man = dir.succeed("man");
     assert!(man.text().contains(".TH plotplan 1") && man.text().contains("convert"), "{}", man.text());
-    let version = desk.good("--version");
-    // With the commit, where the program was built in a checkout.
+    let version = dir.succeed("--version");
+    // Includes the commit if built in a checkout.
     let commit = version.text().strip_prefix(concat!("plotplan ", env!("CARGO_PKG_VERSION"))).map(str::trim);
     let commit = commit.expect("name and version").trim_matches(['(', ')']);
     assert!(commit.bytes().all(|byte| byte.is_ascii_hexdigit()), "{}", version.text());
-    let page = desk.good("man send");
+    let page = dir.succeed("man send");
     assert!(
         page.text().contains(".TH plotplan-send 1") && page.text().contains("protocol"),
         "{}",
         page.text()
     );
-    assert_eq!(desk.run("man nosuch").code, 2);
+    assert_eq!(dir.run("man nosuch").code, 2);
 }
 
 #[test]
 fn machine_files_in_config_folder_by_name() {
-    let desk = Desk::new();
-    let folder = desk.path().join("plotplan/machines");
+    let dir = TestDir::new();
+    let folder = dir.path().join("plotplan/machines");
     fs::create_dir_all(&folder).expect("a folder");
-    let mine = desk.good("machine show corexy").text().replacen("name = \"corexy\"", "name = \"mine\"", 1);
+    let mine = dir.succeed("machine show corexy").text().replacen("name = \"corexy\"", "name = \"mine\"", 1);
     fs::write(folder.join("mine.toml"), &mine).expect("a file can be written");
     let run = |arguments: &str| {
-        let mut command = desk.command(arguments);
-        Said::of(command.env("XDG_CONFIG_HOME", desk.path()).output().expect("the program runs"))
+        let mut command = dir.command(arguments);
+        CommandOutput::of(command.env("XDG_CONFIG_HOME", dir.path()).output().expect("the program runs"))
     };
     assert!(run("machine list").text().lines().any(|line| line.starts_with("mine ")));
     assert_eq!(run("machine show mine").text(), mine);
     let said = run("convert tiny.hpgl --machine mine --output mine.ticks");
     assert_eq!(said.code, 0, "{}", said.err);
-    assert!(desk.text("mine.ticks").contains("; machine: mine\n"));
-    // A plan of that machine finds it by its name.
+    assert!(dir.text("mine.ticks").contains("; machine: mine\n"));
+    // A plan of that machine refers to it by name.
     assert_eq!(run("verify mine.ticks --drawing tiny.hpgl").code, 0);
     let said = run("convert tiny.hpgl --machine mime");
     assert!(said.code == 2 && said.err.contains("did you mean mine?"), "{}", said.err);
-    assert_eq!(desk.run("machine show mine").code, 2);
+    assert_eq!(dir.run("machine show mine").code, 2);
 }
 
 #[test]
 fn point_list_import() {
-    let desk = Desk::new();
-    desk.put("points.txt", "// seed 4's\n<70.05, 82.46>, <74.10, 83.20>,\n<74.1, 83.2>, <74.10, 90.00>\n");
-    let svg = desk.good("convert points.txt --format svg");
+    let dir = TestDir::new();
+    dir.write("points.txt", "// report 4\n<70.05, 82.46>, <74.10, 83.20>,\n<74.1, 83.2>, <74.10, 90.00>\n");
+    let svg = dir.succeed("convert points.txt --format svg");
     assert!(svg.text().contains("74.1"), "{}", svg.text());
-    desk.good("convert points.txt --machine polar --output points.ticks");
-    desk.good("verify points.ticks --drawing points.txt");
-    let said = desk.good("info points.txt");
+    dir.succeed("convert points.txt --machine polar --output points.ticks");
+    dir.succeed("verify points.ticks --drawing points.txt");
+    let said = dir.succeed("info points.txt");
     assert!(said.text().contains("points <x, y>, mm") && said.text().contains("10.9 mm"), "{}", said.text());
-    desk.good("preview points.txt --machine polar --output points.svg");
-    desk.good("check points.txt --machine polar");
+    dir.succeed("preview points.txt --machine polar --output points.svg");
+    dir.succeed("check points.txt --machine polar");
 }
 
-/// The six numbers of a CSV plan's placement.
+/// The six coefficients of the placement in a CSV plan.
 fn placement(csv: &str) -> Vec<f64> {
     let line = csv.lines().find_map(|line| line.strip_prefix("# placement: ")).expect("a placement");
     line.split(' ').map(|number| number.parse().expect("a number")).collect()
@@ -653,18 +654,18 @@ fn placement(csv: &str) -> Vec<f64> {
 
 #[test]
 fn placement_options() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let placed = |wish: &str| {
-        placement(desk.good(&format!("convert tiny.hpgl --machine coaxial --format csv {wish}")).text())
+        placement(dir.succeed(&format!("convert tiny.hpgl --machine coaxial --format csv {wish}")).text())
     };
-    // The sheet's lower left corner is at (12.7, 76.2).
+    // The lower left corner of the sheet is at (12.7, 76.2).
     for (wish, expected) in [
         ("", [1.0, 0.0, 0.0, 1.0, 12.7, 76.2]),
         ("--place 1in,25", [1.0, 0.0, 0.0, 1.0, 38.1, 101.2]),
         ("--place -5mm,2cm", [1.0, 0.0, 0.0, 1.0, 7.7, 96.2]),
         ("--scale 2", [2.0, 0.0, 0.0, 2.0, 12.7, 76.2]),
         ("--scale 2 --place 10,10", [2.0, 0.0, 0.0, 2.0, 22.7, 86.2]),
-        // The box of the ink, (5, 10) to (30, 25), is 15 wide and 25 high afterwards; its lower left corner stays.
+        // The bounding box (5, 10) to (30, 25) becomes 15 wide and 25 high; its lower left corner stays.
         ("--rotate 90", [0.0, 1.0, -1.0, 0.0, 12.7 + 30.0, 76.2 + 5.0]),
         ("--rotate 90 --scale 2", [0.0, 2.0, -2.0, 0.0, 12.7 + 60.0, 76.2 + 10.0]),
         ("--rotate 180", [-1.0, 0.0, 0.0, -1.0, 12.7 + 35.0, 76.2 + 35.0]),
@@ -673,18 +674,18 @@ fn placement_options() {
         let near = found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-9);
         assert!(found.len() == 6 && near, "{wish}: {found:?}, not {expected:?}");
     }
-    // 25 mm on 215.9 mm: as wide as the sheet, and in the middle of its height.
+    // 25 mm scaled to 215.9 mm: the width of the sheet, centred vertically.
     let fit = placed("--fit");
     let expected = [8.636, 0.0, 0.0, 8.636, 12.7 - 5.0 * 8.636, 76.2 + 279.4 / 2.0 - 17.5 * 8.636];
     assert!(fit.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.01), "{fit:?}");
 }
 
-/// A plan begins and ends with the pen up, wherever its ink does.
+/// A plan starts and ends with the pen up, even if ink starts there.
 #[test]
 fn ink_at_start_pose() {
-    let desk = Desk::new();
-    desk.put("there.hpgl", "IN;SP1;PU0,0;PD400,0,400,400,0,0;PU;");
-    let said = desk.good("convert there.hpgl --machine cartesian --format csv");
+    let dir = TestDir::new();
+    dir.write("there.hpgl", "IN;SP1;PU0,0;PD400,0,400,400,0,0;PU;");
+    let said = dir.succeed("convert there.hpgl --machine cartesian --format csv");
     let all = rows(said.text());
     assert_eq!(all[0], [0, 0, 0, 0]);
     assert_eq!(all[all.len() - 1][1..], [0, 0, 0]);
@@ -693,10 +694,10 @@ fn ink_at_start_pose() {
 
 #[test]
 fn settings_in_plan_document() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let plan =
-        |options: &str| desk.good(&format!("convert tiny.hpgl --machine corexy --format csv {options}"));
-    // Time between rows: the machine's own, or as asked for; longer only where the motors stand still.
+        |options: &str| dir.succeed(&format!("convert tiny.hpgl --machine corexy --format csv {options}"));
+    // Period: that of the machine, or of the option; longer only while the motors stand still.
     for (options, period) in [("", 10_000), ("--period 2ms", 2_000), ("--period 250us", 250)] {
         let said = plan(options);
         for pair in rows(said.text()).windows(2) {
@@ -705,14 +706,15 @@ fn settings_in_plan_document() {
             assert!(step == period || still && step > period, "{options}: {pair:?}");
         }
     }
-    // The file's order: pen 1 first, and its strokes from their first points.
+    // File order: pen 1 first, strokes from their first points.
     let said = plan("--order file");
     let downs = pen_downs(said.text());
-    // CI goes from the circle's rightmost point.
+    // CI starts at the rightmost point of the circle.
     assert_eq!(downs, [(1, 10.0, 10.0), (1, 25.0, 20.0), (2, 5.0, 25.0), (2, 7.5, 22.5)]);
 }
 
-/// Where each pen goes down, mm to a quarter, in a CSV plan of the CoreXY table: 92.03 counts a mm of x + y and x - y.
+/// Positions of all pen-downs in a CSV plan of `corexy`, rounded to 0.25 mm: 92.03 ticks per mm of x + y
+/// and x - y.
 fn pen_downs(csv: &str) -> Vec<(i64, f64, f64)> {
     let all = rows(csv);
     let downs = all.windows(2).filter(|pair| pair[0][1] == 0 && pair[1][1] != 0).map(|pair| {
@@ -725,11 +727,11 @@ fn pen_downs(csv: &str) -> Vec<(i64, f64, f64)> {
 
 #[test]
 fn ordering_options() {
-    let desk = Desk::new();
-    desk.put("pens.hpgl", PENS);
+    let dir = TestDir::new();
+    dir.write("pens.hpgl", PENS);
     let run = |options: &str| {
         let said =
-            desk.good(&format!("convert pens.hpgl --machine corexy --format csv --report json {options}"));
+            dir.succeed(&format!("convert pens.hpgl --machine corexy --format csv --report json {options}"));
         let report: serde_json::Value =
             serde_json::from_str(said.err.lines().last().expect("a line")).expect("one JSON object");
         let seconds = |what: &str| report["summary"][what].as_f64().expect("a number");
@@ -741,7 +743,7 @@ fn ordering_options() {
     assert!((ink - 80.0).abs() < 0.1, "{ink}");
     let (kept, _) = run("--keep-direction");
     assert!(kept.iter().all(|(_, x, _)| *x == 10.0), "no stroke from its other end: {kept:?}");
-    // Every other line from right to left.
+    // Every second line from right to left.
     let (optimized, [all, _, shorter]) = run("");
     let pens = |downs: &[(i64, f64, f64)]| downs.iter().map(|(pen, ..)| *pen).collect::<Vec<_>>();
     assert_eq!(pens(&optimized), [1, 2, 3]);
@@ -751,7 +753,7 @@ fn ordering_options() {
     assert_eq!(pens(&deduped), [1, 2, 3]);
     assert!((once - 60.0).abs() < 0.1, "{once}");
     assert_eq!(pens(&run("--pen-order 3,1").0), [3, 1, 2]);
-    // 20 mm at 2 cm/s, the others at the machine's 60 mm/s.
+    // 20 mm at 2 cm/s, the others at the limit of the machine, 60 mm/s.
     let (_, [_, slow, _]) = run("--order file --speed file");
     assert!((slow - drawing - (20.0 / 20.0 - 20.0 / 60.0)).abs() < 0.15, "{slow} s, {drawing} s");
     for effort in 0..=3 {
@@ -763,15 +765,15 @@ fn ordering_options() {
     }
 }
 
-/// Plans, whole, at a coarse period. Whatever changes the planner's time law changes them all.
+/// Complete plans with a long period. A change of the time parametrization changes all of them.
 #[test]
 fn plans_for_every_machine() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for machine in PRESETS {
-        let said = desk.good(&format!("convert tiny.hpgl --machine {machine} --format csv --period 100ms"));
+        let said = dir.succeed(&format!("convert tiny.hpgl --machine {machine} --format csv --period 100ms"));
         let plan = format!("{}\n{}", said.err, said.text());
         insta::assert_snapshot!(format!("plan_{machine}"), plan);
     }
-    let said = desk.good("convert tiny.hpgl --machine corexy --period 100ms");
+    let said = dir.succeed("convert tiny.hpgl --machine corexy --period 100ms");
     insta::assert_snapshot!("plan_corexy_ticks", said.text());
 }

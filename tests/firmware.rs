@@ -1,6 +1,6 @@
-//! What firmwares make of the files that are written for them: each format is followed by a replayer of that firmware's own
-//! semantics, its defects included, and the ink is held against the drawing by the verifier, or against the plan's own
-//! ticks where nothing may differ.
+//! Each firmware format, executed by a model of that firmware including its known defects. The verifier
+//! measures the ink against the drawing; where no deviation is allowed, the ticks are compared with
+//! those of the plan.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use verify::{Certificate, Verifier};
 
 /// The default of `--tolerance`, mm.
 const TOLERANCE: f64 = 0.1;
-/// Motor positions of machines made here, a mm or a degree.
+/// Resolution of the machines defined here, in ticks per mm or degree.
 const FINE: f64 = 1000.0;
 
 type Point = [f64; 2];
@@ -32,14 +32,14 @@ fn top() -> PathBuf {
 
 fn preset(name: &str) -> Machine {
     let preset = PRESETS.iter().find(|preset| preset.name == name).expect(name);
-    MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a sound preset")
+    MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a valid preset")
 }
 
-/// Runs convert and gives what it wrote.
+/// Runs `convert` and returns its output.
 fn convert(file: &str, machine: &str, format: &str, options: &[&str]) -> String {
     let mut command = Command::new(cargo_bin!("plotplan"));
     command.current_dir(top()).args(["convert", file, "--machine", machine, "--format", format]);
-    // The single-belt plotter's table is 250 mm wide, and its firmware takes what is below that.
+    // The bed of the H-bot is 250 mm wide, and its firmware accepts only smaller coordinates.
     let place = if machine == "hbot" { &["--scale", "0.6", "--place", "10mm,10mm"][..] } else { &["--fit"] };
     command.args(place);
     let output = command.args(options).output().expect("the program runs");
@@ -53,7 +53,7 @@ fn plan(file: &str, machine: &str, options: &[&str]) -> TickTable {
     plan::file::read(csv.as_bytes()).expect("a plan").table
 }
 
-/// The drawing where the plan puts it.
+/// The drawing, placed as in the plan.
 fn placed(file: &str, plan: &TickTable) -> Drawing {
     let bytes = std::fs::read(top().join(file)).expect("a drawing");
     let document = hpgl::read(&bytes, &hpgl::Options::default());
@@ -62,7 +62,7 @@ fn placed(file: &str, plan: &TickTable) -> Drawing {
     drawing
 }
 
-/// All pens as one, for formats that know no other.
+/// The drawing with pen 1 only, for formats without pen numbers.
 fn with_one_pen(mut drawing: Drawing) -> Drawing {
     for stroke in &mut drawing.strokes {
         stroke.pen = drawing::Pen(1);
@@ -70,7 +70,7 @@ fn with_one_pen(mut drawing: Drawing) -> Drawing {
     drawing
 }
 
-/// A machine that is nothing but a fine ruler: x and y in mm, or angle in degrees and radius.
+/// A machine with a fine resolution: x and y in mm, or angle in degrees and radius in mm.
 fn ruler(geometry: Geometry) -> Machine {
     let angle = geometry.joint_is_angle()[0];
     let motor = |name: &str, counts: f64| Motor {
@@ -99,11 +99,12 @@ fn ruler(geometry: Geometry) -> Machine {
         start: JointPos::new(0.5, 100.0),
         period_s: 0.01,
     })
-    .expect("a sound machine")
+    .expect("a valid machine")
 }
 
-/// Holds ink against a drawing. Places are motor positions of `machine`, times `scale`; limits are nobody's business here.
-fn hold(machine: &Machine, drawing: &Drawing, ink: &Lines, scale: f64) -> Certificate {
+/// Measures ink against a drawing. Ink is in motor positions of `machine` times `scale`; limits are not
+/// checked.
+fn measure(machine: &Machine, drawing: &Drawing, ink: &Lines, scale: f64) -> Certificate {
     let limits = Limits { speed: 1e15, acceleration: 1e18, jerk: None };
     let header = Header {
         machine: machine.name().into(),
@@ -133,12 +134,13 @@ fn hold(machine: &Machine, drawing: &Drawing, ink: &Lines, scale: f64) -> Certif
     verifier.finish()
 }
 
-/// Fails unless the ink is the drawing, both ways, within so many mm.
+/// Fails if the deviation exceeds `most` mm in either direction.
 fn within(what: &str, certificate: &Certificate, drawing: &Drawing, most: f64) {
     within_length(what, certificate, drawing, most, 1.3);
 }
 
-/// The same where motors that go one after the other draw stairs, `stairs` times as long as the drawing at the most.
+/// As `within`, for motors that move one after the other: the ink is at most `stairs` times as long as
+/// the drawing.
 fn within_length(what: &str, certificate: &Certificate, drawing: &Drawing, most: f64, stairs: f64) {
     let off = certificate.after_rounding;
     assert!(off.max_mm() <= most, "{what}: {off:?}, allowed is {most} mm");
@@ -146,7 +148,7 @@ fn within_length(what: &str, certificate: &Certificate, drawing: &Drawing, most:
     let mut drawn = certificate.pens.clone();
     drawn.sort_unstable();
     assert_eq!(drawn, pens, "{what}: pens");
-    // Not much is drawn twice, either.
+    // The length limits double drawing.
     assert!(certificate.ink_mm < stairs * drawing.length() + 5.0, "{what}: {} mm of ink", certificate.ink_mm);
 }
 
@@ -158,13 +160,13 @@ const DRAWINGS: [&str; 4] = [
 ];
 const ONE_STROKE: &str = "examples/zot.hpgl";
 
-/// Seed 1's firmware: what each command does, with both motors on their own way to each set point.
+/// Firmware of report 1: each motor moves to each setpoint independently.
 struct CoaxialFirmware {
     at: Point,
     down: bool,
     pen: u16,
     ink: Ink,
-    /// Which motor arrives first; nothing if both arrive together.
+    /// The motor that arrives first; `None` if both arrive together.
     first: Option<usize>,
 }
 
@@ -184,7 +186,7 @@ impl CoaxialFirmware {
         self.ink.pen(if down { self.pen } else { 0 }, self.at);
     }
 
-    /// A file, as its reader takes it: a list of quoted strings a line.
+    /// Executes a file: each line is a list of quoted strings.
     fn follow(&mut self, file: &str, point: &dyn Fn(&str) -> Point) {
         for line in file.lines() {
             let inner = line.strip_prefix("['").and_then(|rest| rest.strip_suffix("']")).expect(line);
@@ -195,7 +197,7 @@ impl CoaxialFirmware {
             let points: Vec<Point> = words[1..].iter().map(|word| point(word)).collect();
             match mnemonic {
                 "IN" => {}
-                // Neglected by the firmware; here a man puts in the pen.
+                // Ignored by the firmware; the operator changes the pen.
                 "SP" => self.pen = count.parse().expect("a pen"),
                 "PU" => {
                     assert_eq!((count.parse(), points.len()), (Ok(1), 1), "{line}");
@@ -206,7 +208,7 @@ impl CoaxialFirmware {
                     assert_eq!(count.parse(), Ok(points.len()), "{line}");
                     self.go(points[0]);
                     self.set(true);
-                    // Its loop ends one short: the last point is never gone to.
+                    // Off-by-one error of the firmware: it never moves to the last point.
                     for to in &points[1..points.len() - 1] {
                         self.go(*to);
                     }
@@ -238,8 +240,9 @@ fn coaxial_commands_ink() {
         let start = plan.rows[0].ticks.map(|ticks| ticks as f64);
         for first in [None, Some(0), Some(1)] {
             let ink = coaxial_ink(&commands, start, first, &point);
-            let certificate = hold(&machine, &drawing, &ink, 1.0);
-            // Half a tick of both motors, and a whole one of the slower where they do not arrive together.
+            let certificate = measure(&machine, &drawing, &ink, 1.0);
+            // Half a tick of both motors, and a whole tick of the slower one where they do not arrive
+            // together.
             let apart = if first.is_some() { 0.51 } else { 0.02 };
             let what = format!("{file}, {first:?}");
             within_length(&what, &certificate, &drawing, TOLERANCE + 0.4536 + apart, 2.5);
@@ -259,19 +262,18 @@ fn coaxial_commands_in_inches_ink() {
             let inner = word.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).expect(word);
             let (x, y) = inner.split_once(", ").expect("two numbers");
             let inches = [x, y].map(|number| number.parse::<f64>().expect("inches"));
-            // From the sheet's upper left corner, y down.
+            // From the upper left corner of the sheet, y down.
             [sheet.x0 + 25.4 * inches[0], sheet.y1 - 25.4 * inches[1]]
         };
         let ink = coaxial_ink(&commands, [0.0, 0.0], None, &point);
-        within(file, &hold(&machine, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.003);
+        within(file, &measure(&machine, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.003);
     }
 }
 
-/// Seed 2's firmware: it takes y first, turns a place into whole counts of both motors by truncation, and each motor goes
-/// there by itself.
+/// Firmware of report 2: y first, counts truncated, each motor moves independently.
 fn single_belt_ink(file: &str, first: Option<usize>) -> Lines {
     let mut ink = Ink::default();
-    // Homed, it goes to the middle by itself.
+    // After homing it moves to the centre.
     let mut at = [3100.0, 3100.0];
     for line in file.lines() {
         match line {
@@ -312,8 +314,9 @@ fn xy_serial_ink() {
         let drawing = with_one_pen(placed(file, &plan));
         let lines = convert(file, "hbot", "xy-serial", &[]);
         for first in [None, Some(0), Some(1)] {
-            let certificate = hold(&machine, &drawing, &single_belt_ink(&lines, first), 1.0);
-            // A tenth of a mm rounded, counts truncated; between two places 0.28 mm apart the motors may go one by one.
+            let certificate = measure(&machine, &drawing, &single_belt_ink(&lines, first), 1.0);
+            // Positions rounded to 0.1 mm, counts truncated; between positions 0.28 mm apart the motors may
+            // move one after the other.
             let apart = if first.is_some() { 0.2 } else { 0.0 };
             let floor = 0.05 * std::f64::consts::SQRT_2 + 0.0806;
             let what = format!("{file}, {first:?}");
@@ -322,7 +325,7 @@ fn xy_serial_ink() {
     }
 }
 
-/// Radii and angles of seed 4's table or arrays.
+/// Radii and angles of the table or arrays of report 4.
 fn polar_points(text: &str) -> Vec<Point> {
     if let Some(table) = text.strip_prefix("r,theta,dist\n") {
         let row = |line: &str| {
@@ -339,7 +342,7 @@ fn polar_points(text: &str) -> Vec<Point> {
     array("radii").into_iter().zip(array("angles")).map(|(r, theta)| [r, theta]).collect()
 }
 
-/// The robot's angle is measured from the left, clockwise; the ruler's from the right.
+/// The robot measures its angle clockwise from the left, the machine here counterclockwise from the right.
 fn polar_ink(points: impl Iterator<Item = Point>) -> Lines {
     vec![(1, points.map(|[r, theta]| [180.0 - theta, r]).collect())]
 }
@@ -352,32 +355,34 @@ fn polar_csv_and_c_arrays_ink() {
     let table = polar_points(&convert(ONE_STROKE, "polar", "polar-csv", &[]));
     let arrays = polar_points(&convert(ONE_STROKE, "polar", "c-arrays", &[]));
     assert_eq!(arrays[arrays.len() - 1], arrays[arrays.len() - 2], "the last point is never sent");
-    // With its 20 steps between neighbours put right: the table's way, to half a servo microsecond's rounding of the plan.
-    let smooth = |points: &[Point]| hold(&machine, &drawing, &polar_ink(points.iter().copied()), FINE);
+    // With corrected interpolation (20 steps between points): the path of the table, rounded to half a
+    // microsecond of servo pulse.
+    let smooth = |points: &[Point]| measure(&machine, &drawing, &polar_ink(points.iter().copied()), FINE);
     within("table", &smooth(&table), &drawing, TOLERANCE + 0.05 + 0.01);
     within("arrays", &smooth(&arrays), &drawing, TOLERANCE + 0.05 + 0.03);
-    // As it is written: (j / 20) is 0, so it holds each point but the last, and Servo.write takes whole degrees.
+    // As printed: (j / 20) is 0 in integer arithmetic, so it holds each point except the last, and
+    // Servo.write rounds to degrees.
     let held = arrays[..arrays.len() - 1].iter().map(|[r, theta]| [*r, theta.trunc()]);
-    let certificate = hold(&machine, &drawing, &polar_ink(held), FINE);
+    let certificate = measure(&machine, &drawing, &polar_ink(held), FINE);
     let degree = 138.0_f64 * 1.0_f64.to_radians();
     within("as written", &certificate, &drawing, TOLERANCE + 0.05 + 0.03 + degree + 0.1);
 }
 
-/// Feeds a machine its lines, one after the other, and waits for everything to be done.
+/// Sends lines to an emulator one by one, and waits until all motion is done.
 fn feed(device: &mut dyn Device, text: &str, end: char) -> Ink {
     let mut now_us = 0;
     for line in text.split(['\n', '\r']).filter(|line| !line.is_empty()) {
         device.answers();
         device.receive(format!("{line}{end}").as_bytes(), now_us);
         if line.starts_with("M0") {
-            // It pauses once everything before has been done; then another pen is put in.
+            // It pauses after all earlier motion; then the pen is changed.
             while let Some(next_us) = device.wake_us() {
                 now_us = next_us.max(now_us + 1);
                 device.advance(now_us);
             }
             device.receive(b"~", now_us);
         }
-        // Until it has answered: one line is never in its way.
+        // One line in flight: wait for the answer.
         loop {
             let answers = device.answers().concat();
             let answer = String::from_utf8_lossy(&answers).trim().to_lowercase();
@@ -398,7 +403,7 @@ fn feed(device: &mut dyn Device, text: &str, end: char) -> Ink {
     device.ink().clone()
 }
 
-/// The plan's ink in ticks, with all pens as one.
+/// The ink of the plan in ticks, as one pen.
 fn planned(plan: &TickTable) -> Lines {
     let rows: Vec<Row> = plan.rows.iter().map(|row| Row { pen: row.pen.min(1), ..*row }).collect();
     Ink::of_rows(&rows).lines()
@@ -448,12 +453,12 @@ fn ebb_step_times() {
             _ => 0,
         };
     }
-    // Before the plan begins the pen goes up, half a second.
+    // Before the plan starts, the pen goes up for half a second.
     let off = said_us - 500_000 - plan.header.duration_us as i64;
     assert!(off.abs() <= 2000, "{off} us");
 }
 
-/// The words of other flavours in grbl's.
+/// Translates the other G-code flavours to that of grbl.
 fn as_grbl(text: &str) -> String {
     let line = |line: &str| -> Option<String> {
         let line = line.split(';').next().unwrap_or_default().trim();
@@ -490,8 +495,8 @@ fn gcode_ink_with_arcs() {
                 );
                 assert!(text.lines().all(|line| line.len() < 80), "{file}: grbl takes 79 characters");
                 let ink = feed(&mut Grbl::new(), &as_grbl(&text), '\n').lines();
-                // Three decimals, the machine's chords of arcs, and chords of ellipses.
-                let certificate = hold(&ruler, &drawing, &ink, FINE);
+                // Rounding to 3 decimals, and chord errors of arcs and ellipses.
+                let certificate = measure(&ruler, &drawing, &ink, FINE);
                 within(&format!("{file} {format} {pen:?}"), &certificate, &drawing, 0.015 + 0.011);
             }
         }
@@ -507,7 +512,7 @@ fn gcode_timed_ink_and_duration() {
         let drawing = with_one_pen(placed(file, &plan));
         let text = convert(file, machine, "gcode-timed", &[]);
         let ink = feed(&mut Grbl::new(), &text, '\n').lines();
-        within(machine, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
+        within(machine, &measure(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
         let mut seconds = 0.0;
         for line in text.lines() {
             let last = |letter: char| {
@@ -520,7 +525,7 @@ fn gcode_timed_ink_and_duration() {
             }
         }
         let planned = plan.header.duration_us as f64 * 1e-6;
-        // Ways of less than a micrometre are not said, nor the time that they take.
+        // Moves of less than a micrometre are dropped, and so is their duration.
         assert!((seconds - planned).abs() < 0.02 * planned, "{machine}: {seconds} s instead of {planned} s");
     }
 }
@@ -530,7 +535,7 @@ fn klipper_step_times() {
     for (file, machine) in [(DRAWINGS[0], "corexy"), (DRAWINGS[1], "coaxial"), (DRAWINGS[3], "hbot")] {
         let plan = plan(file, machine, &[]);
         let text = convert(file, machine, "klipper-steps", &[]);
-        // Clock, motor and direction of every step; clock and state of every pen event.
+        // Clock, motor and direction of each step; clock and state of each pen event.
         let mut steps: [Vec<(u64, i64)>; 2] = [Vec::new(), Vec::new()];
         let mut pens: Vec<(u64, bool)> = Vec::new();
         let (mut clock, mut direction) = ([0_u64; 2], [0_i64; 2]);
@@ -544,7 +549,7 @@ fn klipper_step_times() {
             let oid = words["oid"] as usize;
             match line.split(' ').next() {
                 Some("reset_step_clock") => {
-                    // The low half of a clock that only goes on.
+                    // The low 32 bits of a monotonic clock.
                     let low = words["clock"] as u64;
                     clock[oid] += low.wrapping_sub(clock[oid]) & 0xFFFF_FFFF;
                 }
@@ -573,7 +578,7 @@ fn klipper_step_times() {
                 for k in 0..way.abs() {
                     let (clock, direction) = *done.next().expect("a step");
                     assert_eq!(direction, way.signum(), "{file}: direction");
-                    // Where the motor passes the middle between two positions.
+                    // The motor crosses the midpoint between two ticks.
                     let ideal = from as f64 + (k as f64 + 0.5) / way.abs() as f64 * (to - from) as f64;
                     assert!((clock as f64 - ideal).abs() <= 1.0, "{file}: {clock} instead of {ideal}");
                     at += direction;
@@ -594,7 +599,7 @@ fn klipper_step_times() {
     }
 }
 
-/// Ink of samples (pen, pen position), on a ruler.
+/// Ink of samples (pen, pen position).
 fn sampled(samples: impl Iterator<Item = (u16, Point)>) -> Lines {
     let mut ink = Ink::default();
     let mut before = 0;
@@ -643,7 +648,7 @@ fn joint_trajectory_quintic_ink() {
                     );
                     let (p1, v1, a1) =
                         (of(to, "positions"), of(to, "velocities") * t, of(to, "accelerations") * t * t);
-                    // The quintic with these ends.
+                    // Quintic with these boundary values.
                     let c3 = 10.0 * (p1 - p0) - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1;
                     let c4 = -15.0 * (p1 - p0) + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1;
                     let c5 = 6.0 * (p1 - p0) - 3.0 * (v0 + v1) - 0.5 * (a0 - a1);
@@ -654,10 +659,10 @@ fn joint_trajectory_quintic_ink() {
             }
         }
         let ink = sampled(samples.into_iter());
-        // What the quintics swing about the rows comes on top of the tolerance.
-        let c = hold(&ruler, &drawing, &ink, FINE);
+        // The quintics oscillate around the rows, beyond the tolerance.
+        let c = measure(&ruler, &drawing, &ink, FINE);
         println!("{name} {:?} {:?}", c.after_rounding, c.failures);
-        within(name, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.02);
+        within(name, &measure(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.02);
     }
 }
 
@@ -682,7 +687,7 @@ fn halstreamer_and_pvt_ink() {
             });
             let ink = sampled(samples);
             let what = format!("{name} {period}");
-            within(&what, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
+            within(&what, &measure(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
 
             let rows = convert(DRAWINGS[0], name, "pvt", &options);
             let rows: Vec<Vec<f64>> = rows
@@ -695,7 +700,7 @@ fn halstreamer_and_pvt_ink() {
                 let t = to[0] - from[0];
                 (0..4).map(move |k| {
                     let s = f64::from(k) / 4.0;
-                    // The cubic with these positions and velocities.
+                    // Cubic with these positions and velocities.
                     let motor = |m: usize| {
                         let (p0, v0, p1, v1) =
                             (from[2 + 2 * m], from[3 + 2 * m] * t, to[2 + 2 * m], to[3 + 2 * m] * t);
@@ -709,12 +714,12 @@ fn halstreamer_and_pvt_ink() {
                 })
             });
             let ink = sampled(samples.map(|(pen, ticks)| (pen, at(ticks))));
-            within(&what, &hold(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
+            within(&what, &measure(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
         }
     }
 }
 
-/// Runs convert, which has to refuse, and gives why.
+/// Runs `convert`, which must fail, and returns the error message.
 fn refusal(arguments: &[&str]) -> String {
     let output = Command::new(cargo_bin!("plotplan"))
         .current_dir(top())
@@ -758,6 +763,6 @@ fn formats_page_lists_every_format() {
     let formats: Vec<&str> = values.split([',', ' ', '\n']).filter(|word| !word.is_empty()).collect();
     assert!(formats.len() > 15, "{formats:?}");
     for format in formats {
-        assert!(text.contains(&format!("`{format}`")), "docs/formats.md says nothing of {format}");
+        assert!(text.contains(&format!("`{format}`")), "docs/formats.md does not list {format}");
     }
 }

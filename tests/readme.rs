@@ -1,4 +1,5 @@
-//! README.md says what the program says: its console blocks are run, its picture drawn, its links followed.
+//! README.md is up to date: console blocks print the shown output, the picture is current, and links
+//! resolve.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ fn readme() -> String {
     fs::read_to_string(top().join("README.md")).expect("README.md")
 }
 
-/// Commands of the README's console blocks, each with the output that stands below it.
+/// Commands of the console blocks of the README, each with the output shown below it.
 fn commands(readme: &str) -> Vec<(String, String)> {
     let mut commands: Vec<(String, String)> = Vec::new();
     for block in readme.split("```console\n").skip(1) {
@@ -30,8 +31,9 @@ fn commands(readme: &str) -> Vec<(String, String)> {
     commands
 }
 
-/// What a command of the README says, in the top folder. Whatever it writes goes into `folder`, and is read from there.
-fn say(command: &str, folder: &Path) -> String {
+/// Runs a command of the README in the top folder and returns its output. Files that it writes, or reads
+/// back, are in `folder`.
+fn run(command: &str, folder: &Path) -> String {
     let written = |name: &str| folder.join(name.replace('/', "-"));
     if let Some((count, file)) = command.strip_prefix("head -").and_then(|rest| rest.split_once(' ')) {
         let text = fs::read_to_string(written(file)).expect("written before");
@@ -51,8 +53,8 @@ fn say(command: &str, folder: &Path) -> String {
         }
         output_is_next = argument == "--output";
     }
-    let said = program.assert().success();
-    let output = said.get_output();
+    let printed = program.assert().success();
+    let output = printed.get_output();
     let mut text = String::from_utf8_lossy(&output.stderr).into_owned();
     match redirected {
         Some(file) => fs::write(written(file), &output.stdout).expect("a file can be written"),
@@ -66,8 +68,8 @@ fn readme_commands_print_the_shown_output() {
     let folder = TempDir::new().expect("a folder");
     let mut pictures = 0;
     for (command, expected) in commands(&readme()) {
-        let said = say(&command, folder.path());
-        assert_eq!(said, expected, "`{command}` now says\n{said}");
+        let printed = run(&command, folder.path());
+        assert_eq!(printed, expected, "`{command}` prints\n{printed}");
         if let Some((_, picture)) = command.split_once(" --output ") {
             let drawn = fs::read(folder.path().join(picture.replace('/', "-"))).expect("a picture");
             assert!(drawn == fs::read(top().join(picture)).expect(picture), "run `{command}` again");

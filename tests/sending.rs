@@ -1,5 +1,5 @@
-//! `plotplan send` and `plotplan device` with a real pseudo-terminal between them: every protocol with every mishap, stopped and
-//! gone on with; what the machine drew is the plan, once.
+//! `plotplan send` and an emulated controller over a pseudo-terminal: every protocol with every fault,
+//! stopped and resumed. The ink equals that of the plan, drawn once.
 #![cfg(unix)]
 
 use std::io::{BufRead as _, BufReader};
@@ -19,12 +19,12 @@ use tempfile::TempDir;
 const DRAWING: &str = "IN;SP1;PU400,400;PD800,400,800,600;PU600,1000;CI120;PU300,900;PD;PU;";
 const MACHINE: &str = "hbot";
 const PROTOCOLS: [&str; 4] = ["ticks", "xy-serial", "gcode", "ebb"];
-/// How many times faster than the clock the machines live.
-const HASTE: &str = "10";
+/// Speed-up of the emulators.
+const SPEEDUP: &str = "10";
 
 type Lines = Vec<(u16, Vec<[f64; 2]>)>;
 
-/// A folder with a drawing and its plan.
+/// A temporary folder with a drawing and its plan.
 struct Desk {
     folder: TempDir,
 }
@@ -58,14 +58,14 @@ impl Desk {
         plan::file::read(&std::fs::read(self.path("plan.ticks")).expect("a plan")).expect("a plan").table
     }
 
-    /// Starts a machine; its port is `name`.
+    /// Starts an emulator with the port `name`.
     fn device(&self, protocol: &str, name: &str, options: &[&str]) -> Machinery {
         let ink = format!("{name}.csv");
         let svg = format!("{name}.svg");
         let mut command = self.command(&["device", "--protocol", protocol, "--link", name, "-m", MACHINE]);
         command.args(["--ink", &ink, "--svg", &svg]).args(options).stdout(Stdio::piped());
         let mut child = command.spawn().expect("the program runs");
-        // It says its name once it can be opened.
+        // It prints the name of the port when it can be opened.
         let mut line = String::new();
         let out = child.stdout.take().expect("its output");
         BufReader::new(out).read_line(&mut line).expect("a line");
@@ -80,7 +80,7 @@ impl Desk {
     }
 }
 
-/// A machine that runs.
+/// A running emulator.
 struct Machinery {
     child: Child,
     ink: PathBuf,
@@ -94,13 +94,13 @@ fn interrupt(child: &Child) {
 
 impl Drop for Machinery {
     fn drop(&mut self) {
-        // Where a test has failed: whoever reads the test's output would wait for it.
+        // After a failed test: the emulator would keep the output of the test open.
         let _ = self.child.kill();
     }
 }
 
 impl Machinery {
-    /// Switches it off and gives what it drew.
+    /// Stops the emulator and returns its ink.
     fn ink(mut self) -> Lines {
         interrupt(&self.child);
         assert!(self.child.wait().expect("it ends").success());
@@ -127,7 +127,7 @@ fn machine() -> Machine {
     MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a sound preset")
 }
 
-/// What a machine is to draw, in its own units.
+/// The expected ink in units of the controller.
 fn wanted(protocol: &str, plan: &TickTable) -> Lines {
     let machine = machine();
     let start = plan.rows[0].ticks;
@@ -153,8 +153,8 @@ fn wanted(protocol: &str, plan: &TickTable) -> Lines {
 fn faults_in_every_protocol_leave_ink_unchanged() {
     let desk = Desk::new(DRAWING);
     let plan = desk.plan();
-    // Times are the machine's, which lives ten times as fast.
-    let mishaps = [
+    // Times are those of the emulator, which runs ten times faster than real time.
+    let faults = [
         "none",
         "lost-answer=40",
         "late-answer=40:12s",
@@ -164,27 +164,24 @@ fn faults_in_every_protocol_leave_ink_unchanged() {
     ];
     thread::scope(|scope| {
         for protocol in PROTOCOLS {
-            for (number, mishap) in mishaps.into_iter().enumerate() {
+            for (number, fault) in faults.into_iter().enumerate() {
                 let (desk, plan) = (&desk, &plan);
                 scope.spawn(move || {
                     let name = format!("tty-{protocol}-{number}");
-                    // Time enough to open the port before it goes away.
-                    let haste = if mishap.starts_with("unplugged") { "2" } else { HASTE };
-                    let mut options = vec!["--haste", haste];
-                    if mishap != "none" {
-                        options.extend(["--fault", mishap]);
+                    // Enough time to open the port before it disappears.
+                    let speedup = if fault.starts_with("unplugged") { "2" } else { SPEEDUP };
+                    let mut options = vec!["--haste", speedup];
+                    if fault != "none" {
+                        options.extend(["--fault", fault]);
                     }
                     let device = desk.device(protocol, &name, &options);
                     let output = desk.send(protocol, &name, &[]).output().expect("the program runs");
                     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-                    assert!(output.status.success(), "{protocol} {mishap}: {said}");
+                    assert!(output.status.success(), "{protocol} {fault}: {said}");
                     let svg = device.svg.clone();
-                    assert_eq!(device.ink(), wanted(protocol, plan), "{protocol} {mishap}");
+                    assert_eq!(device.ink(), wanted(protocol, plan), "{protocol} {fault}");
                     let picture = std::fs::read_to_string(svg).expect("a picture");
-                    assert!(
-                        picture.contains("<path") || picture.contains("<polyline"),
-                        "{protocol} {mishap}"
-                    );
+                    assert!(picture.contains("<path") || picture.contains("<polyline"), "{protocol} {fault}");
                 });
             }
         }
@@ -206,7 +203,7 @@ fn resume_after_ctrl_c() {
                     let log = format!("{name}.log");
                     let mut sender = desk.send(protocol, &name, &["--log", &log]);
                     let sender = sender.stderr(Stdio::piped()).spawn().expect("the program runs");
-                    // From its first word on it can be stopped.
+                    // It can be stopped after its first line of output.
                     while std::fs::read(desk.path(&log)).map_or(0, |log| log.len()) == 0 {
                         thread::sleep(Duration::from_millis(10));
                     }
@@ -254,7 +251,7 @@ fn resume_from_reported_position_after_lost_port() {
                 scope.spawn(move || {
                     let what = format!("{protocol} unplugged at {at}");
                     let name = format!("tty-{protocol}-{at}");
-                    // Away for a second; it does what it was told meanwhile.
+                    // Disconnected for a second, while it executes its buffer.
                     let device = desk.device(protocol, &name, &["--fault", &format!("unplugged={at}:1s")]);
                     let output =
                         desk.send(protocol, &name, &["--reconnect", "100ms"]).output().expect("runs");
@@ -281,7 +278,7 @@ fn send_reads_plans_and_firmware_formats() {
     desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "gcode-grbl", "-o", "arcs.gcode"]);
     let sent = |file: &str, protocol: &str| {
         let port = format!("tty-{file}-{protocol}");
-        let device = desk.device(protocol, &port, &["--haste", HASTE]);
+        let device = desk.device(protocol, &port, &["--haste", SPEEDUP]);
         desk.good(&["send", file, "--protocol", protocol, "--port", &port]);
         device.ink()
     };
@@ -289,7 +286,7 @@ fn send_reads_plans_and_firmware_formats() {
     for (file, protocol) in [("plan.csv", "ticks"), ("plan.json", "ebb"), ("plan.json", "gcode")] {
         assert_eq!(sent(file, protocol), wanted(protocol, &plan), "{file} {protocol}");
     }
-    // Made of the positions before rounding to ticks: half a tick of both motors off.
+    // Computed from positions before rounding to ticks: they differ by half a tick of both motors.
     for (file, protocol) in [("plan.gcode", "gcode"), ("plan.xy", "xy-serial")] {
         let (drawn, plan) = (sent(file, protocol), wanted(protocol, &plan));
         assert_eq!(drawn.len(), plan.len(), "{file}");
@@ -310,7 +307,7 @@ fn send_reads_plans_and_firmware_formats() {
 fn pen_change_awaits_operator() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;SP2;PU100,200;PD300,200;PU;");
     let plan = desk.plan();
-    let device = desk.device("gcode", "tty", &["--haste", HASTE]);
+    let device = desk.device("gcode", "tty", &["--haste", SPEEDUP]);
     let mut sender = desk.send("gcode", "tty", &[]);
     let mut sender = sender.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
     std::io::Write::write_all(&mut sender.stdin.take().expect("its input"), b"\n").expect("it takes Enter");
@@ -325,12 +322,12 @@ fn pen_change_awaits_operator() {
 fn raw_and_paced_protocols() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;");
     let plan = desk.plan();
-    // At once, as fast as the machine takes them: its pseudo-terminal holds the rest back.
-    let device = desk.device("ticks", "tty-raw", &["--haste", HASTE]);
+    // As fast as the emulator reads; its pseudo-terminal blocks the sender.
+    let device = desk.device("ticks", "tty-raw", &["--haste", SPEEDUP]);
     desk.good(&["send", "plan.ticks", "--protocol", "raw", "--port", "tty-raw"]);
     thread::sleep(Duration::from_secs(1));
     assert_eq!(device.ink(), wanted("ticks", &plan), "raw");
-    // In time: the sender takes as long as the plan.
+    // Paced: sending takes as long as the plan.
     let device = desk.device("ticks", "tty-paced", &[]);
     #[allow(clippy::disallowed_methods, reason = "it is about time")]
     let begun = std::time::Instant::now();
