@@ -10,6 +10,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("drawing", &[]),
     ("plan", &[]),
     ("hpgl", &["drawing"]),
+    ("svg", &["drawing"]),
     ("ordering", &["drawing"]),
     ("kinematics", &["drawing"]),
     ("planner", &["drawing", "kinematics", "plan"]),

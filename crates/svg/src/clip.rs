@@ -1,0 +1,201 @@
+//! Clip paths: strokes are cut where they cross the clip's outline, and stay lines, arcs and cubics.
+
+use std::rc::Rc;
+
+use drawing::{FillRule, Point, Rect, Segment, Vec2};
+
+use crate::meet;
+use crate::path::Subpath;
+
+/// Ink on the outline itself stays: half of its line would be visible. So close to the outline counts as on it, mm.
+const ON_EDGE_MM: f64 = 1e-7;
+/// Pieces shorter than this are rounding errors of crossings, mm.
+const SHORTEST_MM: f64 = 1e-9;
+
+/// A region: inside any of its areas and inside all of `within`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Region {
+    pub(crate) areas: Vec<Area>,
+    pub(crate) within: Option<Rc<Region>>,
+}
+
+/// The inside of closed outlines, clipped itself where `within` is given.
+#[derive(Clone, Debug)]
+pub(crate) struct Area {
+    rule: FillRule,
+    edges: Vec<Edge>,
+    bounds: Rect,
+    /// Edges by bands of y, so that few of many are looked at.
+    bands: Vec<Vec<u32>>,
+    pub(crate) within: Option<Rc<Region>>,
+}
+
+/// A piece of the outline that only rises or only falls.
+#[derive(Clone, Debug)]
+struct Edge {
+    segment: Segment,
+    bounds: Rect,
+    from_y: f64,
+    to_y: f64,
+}
+
+impl Area {
+    /// The inside of subpaths (mm), each closed by a line if it is open; nothing if they have no extent.
+    pub(crate) fn new(subpaths: &[Subpath], rule: FillRule) -> Option<Self> {
+        let mut edges: Vec<Edge> = Vec::new();
+        for subpath in subpaths {
+            let first = edges.len();
+            let closing = subpath.segments.last().map(Segment::end).filter(|end| *end != subpath.start);
+            let closing = closing.map(|end| Segment::Line(drawing::Line::new(end, subpath.start)));
+            for segment in subpath.segments.iter().chain(closing.as_ref()) {
+                for piece in meet::monotone(segment) {
+                    // Edges share their ends exactly, so that no ray slips between two of them.
+                    let from_y = edges[first..].last().map_or(subpath.start.y, |edge| edge.to_y);
+                    let to_y = piece.end().y;
+                    edges.push(Edge { segment: piece, bounds: piece.bounding_box(), from_y, to_y });
+                }
+            }
+            if let Some(last) = edges[first..].last_mut() {
+                last.to_y = subpath.start.y;
+            }
+        }
+        let bounds = edges.iter().map(|edge| edge.bounds).reduce(|bounds, other| bounds.union(other))?;
+        let count = edges.len().clamp(1, 4096);
+        let mut area = Self { rule, edges, bounds, bands: vec![Vec::new(); count], within: None };
+        for index in 0..area.edges.len() {
+            let bounds = area.edges[index].bounds;
+            for band in area.bands_of(bounds.y0, bounds.y1) {
+                area.bands[band].push(index as u32);
+            }
+        }
+        Some(area)
+    }
+
+    fn bands_of(&self, low: f64, high: f64) -> std::ops::RangeInclusive<usize> {
+        let count = self.bands.len() as f64;
+        let scale = count / self.bounds.height().max(1e-12);
+        // One more at either side against rounding.
+        let band = |y: f64, more: f64| ((y - self.bounds.y0) * scale + more).clamp(0.0, count - 1.0) as usize;
+        band(low, -0.01)..=band(high, 0.01)
+    }
+
+    /// Winding number (or crossings, by even-odd) of a ray to the right.
+    fn contains(&self, p: Point) -> bool {
+        let bounds = self.bounds;
+        if p.x < bounds.x0 || p.x > bounds.x1 || p.y < bounds.y0 || p.y > bounds.y1 {
+            return false;
+        }
+        let mut winding = 0;
+        for &index in &self.bands[*self.bands_of(p.y, p.y).start()..=*self.bands_of(p.y, p.y).end()].concat()
+        {
+            let edge = &self.edges[index as usize];
+            let rises = edge.from_y <= p.y && p.y < edge.to_y;
+            let falls = edge.to_y <= p.y && p.y < edge.from_y;
+            if (rises || falls) && edge.x_at(p) > p.x {
+                winding += if self.rule == FillRule::EvenOdd || rises { 1 } else { -1 };
+            }
+        }
+        self.rule.is_inside(winding)
+    }
+}
+
+impl Edge {
+    /// Where the edge has the height of `p`; any point to the same side of `p` will do.
+    fn x_at(&self, p: Point) -> f64 {
+        if p.x < self.bounds.x0 || p.x > self.bounds.x1 {
+            return self.bounds.x0;
+        }
+        if let Segment::Line(line) = &self.segment {
+            let t = (p.y - line.p0.y) / (line.p1.y - line.p0.y);
+            return line.p0.x + t.clamp(0.0, 1.0) * (line.p1.x - line.p0.x);
+        }
+        let rises = self.to_y > self.from_y;
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (self.segment.eval(middle).y < p.y) == rises { low = middle } else { high = middle }
+        }
+        self.segment.eval(0.5 * (low + high)).x
+    }
+}
+
+impl Region {
+    fn contains(&self, p: Point) -> bool {
+        self.within.as_ref().is_none_or(|region| region.contains(p))
+            && self
+                .areas
+                .iter()
+                .any(|area| area.contains(p) && area.within.as_ref().is_none_or(|region| region.contains(p)))
+    }
+
+    /// All crossings of a piece with the region's outlines.
+    fn crossings(&self, piece: &Segment, bounds: Rect, cuts: &mut Vec<f64>, work: &mut u64) {
+        for area in &self.areas {
+            let reach = bounds.inflate(ON_EDGE_MM, ON_EDGE_MM);
+            if !overlap(reach, area.bounds) {
+                continue;
+            }
+            for band in area.bands_of(bounds.y0, bounds.y1) {
+                *work = work.saturating_sub(1 + area.bands[band].len() as u64);
+                for &index in &area.bands[band] {
+                    let edge = &area.edges[index as usize];
+                    if *work > 0 && overlap(reach, edge.bounds) {
+                        meet::crossings(piece, &edge.segment, cuts);
+                    }
+                }
+            }
+            if let Some(region) = &area.within {
+                region.crossings(piece, bounds, cuts, work);
+            }
+        }
+        if let Some(region) = &self.within {
+            region.crossings(piece, bounds, cuts, work);
+        }
+    }
+
+    /// The parts of a piece inside the region, in order, as ranges of its parameter. Every pair looked at takes one
+    /// from `work`; without any left, crossings are missed.
+    pub(crate) fn inside(&self, piece: &Segment, work: &mut u64) -> Vec<(f64, f64)> {
+        let mut cuts = vec![0.0, 1.0];
+        self.crossings(piece, piece.bounding_box(), &mut cuts, work);
+        cuts.sort_unstable_by(f64::total_cmp);
+        let mut parts: Vec<(f64, f64)> = Vec::new();
+        let mut from = 0.0;
+        for &to in &cuts[1..] {
+            let (middle, derivative) = (0.5 * (from + to), piece.derivatives(0.5 * (from + to)).0);
+            if (to - from) * derivative.hypot2().sqrt() < SHORTEST_MM && to < 1.0 {
+                continue;
+            }
+            if self.contains_nearly(piece.eval(middle), derivative) {
+                match parts.last_mut() {
+                    Some(last) if last.1 == from => last.1 = to,
+                    _ => parts.push((from, to)),
+                }
+            }
+            from = to;
+        }
+        parts.retain(|&(from, to)| {
+            (to - from) * piece.derivatives(0.5 * (from + to)).0.hypot2().sqrt() >= SHORTEST_MM
+        });
+        parts
+    }
+
+    /// Whether a point of a piece, or one of its neighbours across the piece, is inside.
+    fn contains_nearly(&self, p: Point, along: Vec2) -> bool {
+        let length = along.hypot2().sqrt();
+        if self.contains(p) || length == 0.0 {
+            return self.contains(p);
+        }
+        let across = ON_EDGE_MM / length * Vec2::new(-along.y, along.x);
+        self.contains(p + across) || self.contains(p - across)
+    }
+
+    /// Whether a dot is inside.
+    pub(crate) fn has(&self, p: Point) -> bool {
+        self.contains(p)
+    }
+}
+
+fn overlap(a: Rect, b: Rect) -> bool {
+    a.x0 <= b.x1 && b.x0 <= a.x1 && a.y0 <= b.y1 && b.y0 <= a.y1
+}

@@ -1,0 +1,218 @@
+//! Text in a font of strokes: place, size, anchor, rotation and spacing are the file's.
+
+use std::rc::Rc;
+
+use drawing::{Affine, Point};
+use svgtypes::LengthListParser;
+
+use crate::attributes;
+use crate::codes;
+use crate::path::Subpath;
+use crate::style::{Anchor, Style};
+use crate::units::Axis;
+use crate::walk::{Element, Scope, Walker};
+
+/// Height of capitals in font sizes, as common fonts have it.
+const CAP_HEIGHT_EM: f64 = 0.7;
+
+/// A character with what is given for it alone.
+#[derive(Debug)]
+struct Letter<'a> {
+    character: char,
+    style: Rc<Style<'a>>,
+    place: [Option<f64>; 2],
+    shift: [f64; 2],
+    rotation_deg: f64,
+}
+
+/// The lists of positions of an element, from its first character on.
+#[derive(Debug)]
+struct Lists {
+    first: usize,
+    /// `x`, `y`, `dx`, `dy`, `rotate`.
+    values: [Vec<f64>; 5],
+}
+
+/// The characters of a text element.
+#[derive(Debug, Default)]
+struct Letters<'a> {
+    list: Vec<Letter<'a>>,
+    lists: Vec<Lists>,
+}
+
+/// Draws a text element.
+pub(crate) fn draw<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>) {
+    let mut letters = Letters::default();
+    collect(walker, node, scope, &mut letters);
+    while letters.list.last().is_some_and(|last| last.character == ' ' && !last.style.keeps_space) {
+        letters.list.pop();
+    }
+    let Some(first) = letters.list.first() else { return };
+    let family = first.style.font_family.split(',').next().unwrap_or("").trim().trim_matches(['"', '\'']);
+    let family = if family.is_empty() { "default" } else { family };
+    if walker.options.font.is_none() {
+        walker.note(codes::TEXT_NOT_DRAWN, "text", node, "text is not drawn: no font is given");
+        return;
+    }
+    walker.report(codes::TEXT_FONT, family, node, || {
+        let help = "convert the text to paths in an editor for its own letter shapes".into();
+        (format!("text in the font {family} is drawn in the stroke font"), Some(help))
+    });
+    lay_out(walker, node, scope, &letters.list);
+}
+
+/// Gathers the characters of an element and of the `tspan`s in it.
+fn collect<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>, letters: &mut Letters<'a>) {
+    let basis = scope.basis();
+    let list = |name: &str, axis| -> Vec<f64> {
+        let text = node.attribute(name).unwrap_or("").trim();
+        LengthListParser::from(text).map_while(Result::ok).map(|l| basis.user(l, axis)).collect()
+    };
+    let values = [
+        list("x", Axis::X),
+        list("y", Axis::Y),
+        list("dx", Axis::X),
+        list("dy", Axis::Y),
+        list("rotate", Axis::X),
+    ];
+    letters.lists.push(Lists { first: letters.list.len(), values });
+    for child in node.children() {
+        if let Some(text) = child.text().filter(|_| child.is_text()) {
+            letters.add(text, &scope.style);
+            continue;
+        }
+        match attributes::name(child) {
+            Some("tspan" | "a" | "tref") if child.is_element() => {
+                let mut inner = scope.clone();
+                inner.style = Rc::new(walker.style(child, &scope.style, basis));
+                if inner.style.displayed {
+                    collect(walker, child, &inner, letters);
+                }
+            }
+            Some("textPath") => {
+                let help = "convert it to paths in an editor".into();
+                walker.report(codes::TEXT_NOT_DRAWN, "textPath", child, || {
+                    ("text along a path is not drawn".into(), Some(help))
+                });
+            }
+            _ => {}
+        }
+    }
+    letters.lists.pop();
+}
+
+impl<'a> Letters<'a> {
+    fn add(&mut self, text: &str, style: &Rc<Style<'a>>) {
+        for character in text.chars() {
+            let character = if character.is_ascii_whitespace() { ' ' } else { character };
+            // Blanks collapse, also over the borders of elements.
+            if character == ' '
+                && !style.keeps_space
+                && self.list.last().is_none_or(|last| last.character == ' ')
+            {
+                continue;
+            }
+            let index = self.list.len();
+            // The innermost list that has a value for this character counts.
+            let given = |which: usize| {
+                let lists = self.lists.iter().rev();
+                lists.filter_map(|lists| lists.values[which].get(index - lists.first).copied()).next()
+            };
+            // The last rotation of a list goes on.
+            let rotation = self.lists.iter().rev().find_map(|lists| {
+                let values = &lists.values[4];
+                values.get(index - lists.first).or(values.last()).copied()
+            });
+            let letter = Letter {
+                character,
+                style: Rc::clone(style),
+                place: [given(0), given(1)],
+                shift: [given(2).unwrap_or(0.0), given(3).unwrap_or(0.0)],
+                rotation_deg: rotation.unwrap_or(0.0),
+            };
+            self.list.push(letter);
+        }
+    }
+}
+
+/// Places characters and draws them: chunks between absolute positions are anchored as a whole.
+fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>, letters: &[Letter<'a>]) {
+    let Some(font) = walker.options.font else { return };
+    let em = CAP_HEIGHT_EM / font.cap_height();
+    let mut at = Point::ZERO;
+    let mut rest = letters;
+    while !rest.is_empty() {
+        let is_placed = |letter: &Letter<'_>| letter.place.iter().any(Option::is_some);
+        let length = rest[1..].iter().position(is_placed).map_or(rest.len(), |next| next + 1);
+        let (mut chunk, after) = rest.split_at(length);
+        rest = after;
+        // A blank before the next chunk is the end of a line.
+        if let [before @ .., last] = chunk
+            && !rest.is_empty()
+            && last.character == ' '
+            && !last.style.keeps_space
+        {
+            chunk = before;
+        }
+        let Some(first) = chunk.first() else { continue };
+        at = Point::new(first.place[0].unwrap_or(at.x), first.place[1].unwrap_or(at.y));
+        let origin = at;
+        let mut places = Vec::with_capacity(chunk.len());
+        for letter in chunk {
+            at += (letter.shift[0], letter.shift[1]);
+            places.push(at);
+            let advance = font.glyph(letter.character).map_or(0.6 / em, |glyph| glyph.advance);
+            let blank = if letter.character == ' ' { letter.style.word_spacing } else { 0.0 };
+            at.x += advance * em * letter.style.font_size + letter.style.letter_spacing + blank;
+        }
+        let share = match first.style.anchor {
+            Anchor::Start => 0.0,
+            Anchor::Middle => 0.5,
+            Anchor::End => 1.0,
+        };
+        let back = share * (at.x - origin.x);
+        for (letter, place) in chunk.iter().zip(places) {
+            draw_letter(walker, node, scope, letter, Point::new(place.x - back, place.y));
+        }
+        at.x -= back;
+    }
+}
+
+fn draw_letter<'a>(
+    walker: &mut Walker<'a, '_>,
+    node: Element<'a>,
+    scope: &Scope<'a>,
+    letter: &Letter<'a>,
+    place: Point,
+) {
+    let style = &letter.style;
+    if letter.character == ' ' || !style.visible {
+        return;
+    }
+    let Some(font) = walker.options.font else { return };
+    let Some(glyph) = font.glyph(letter.character) else {
+        let character = letter.character;
+        walker.report(codes::UNKNOWN_CHARACTER, &character.to_string(), node, || {
+            (format!("the stroke font has no character {character:?}"), None)
+        });
+        return;
+    };
+    let fill = walker.color_of(style.fill, style.fill_opacity, node, scope);
+    let color = fill.or_else(|| walker.color_of(style.stroke, style.stroke_opacity, node, scope));
+    let Some(color) = color else {
+        walker.note(codes::NO_PAINT, "", node, "a shape has neither stroke nor fill and is not drawn");
+        return;
+    };
+    let scale = CAP_HEIGHT_EM * style.font_size / font.cap_height();
+    let raise = style.baseline_shift - style.baseline_em * style.font_size;
+    let mut inner = scope.clone();
+    inner.map = scope.map
+        * Affine::translate(place.to_vec2())
+        * attributes::rotation(letter.rotation_deg)
+        * Affine::translate((0.0, -raise))
+        * Affine::scale_non_uniform(scale, -scale);
+    let strokes: Vec<Subpath> =
+        glyph.strokes.iter().filter_map(|points| Subpath::polyline(points, false)).collect();
+    let ink = walker.ink(node, &inner, color);
+    walker.draw(node, &inner, &strokes, &ink);
+}
