@@ -254,6 +254,41 @@ fn strict_treats_warnings_as_errors() {
 }
 
 #[test]
+fn plan_document_settings_make_the_same_plan_again() {
+    let dir = TestDir::new();
+    let options = "--law=sine --segment-time=900ms --overlap-lifts --effort=0 --dedupe --pen-order=2,1 \
+                   --scale=0.5 --place=20mm,1cm --tolerance=0.2mm --period=20ms --allow-over-limit";
+    let convert = |options: &str, output: &str| {
+        dir.succeed(&format!("convert tiny.hpgl --machine corexy --format json -o {output} {options}"));
+        let bytes = fs::read(dir.path().join(output)).expect("a plan document");
+        serde_json::from_slice::<serde_json::Value>(&bytes).expect("JSON")
+    };
+    let first = convert(options, "first.json");
+    let settings = &first["settings"];
+    let given: Vec<&str> = settings["command_line"]
+        .as_array()
+        .expect("options")
+        .iter()
+        .map(|o| o.as_str().expect("text"))
+        .collect();
+    let again = convert(&given.join(" "), "again.json");
+    assert_eq!(first, again, "the document's own options make the same document");
+    for (key, value) in [
+        ("law", serde_json::json!("sine")),
+        ("segment_time_s", serde_json::json!(0.9)),
+        ("tolerance_mm", serde_json::json!(0.2)),
+        ("period_us", serde_json::json!(20_000)),
+        ("allow_over_limit", serde_json::json!(true)),
+        ("program", serde_json::json!(concat!("plotplan ", env!("CARGO_PKG_VERSION")))),
+    ] {
+        assert_eq!(settings[key], value, "{key}");
+    }
+    assert_eq!(settings["ordering"]["pen_order"], serde_json::json!([2, 1]));
+    assert_eq!(settings["placement"]["origin_mm"], serde_json::json!([20.0, 10.0]));
+    assert!(settings["lift_overlap_s"].as_f64() > Some(0.0));
+}
+
+#[test]
 fn json_report_is_last_line_of_stderr() {
     let dir = TestDir::new();
     for machine in PRESETS {

@@ -9,4 +9,8 @@ pub mod import;
 pub mod machine_file;
 pub mod pipeline;
 pub mod quantity;
+pub mod replay;
 pub mod report;
+mod same_ink;
+pub mod scene;
+pub mod settings;

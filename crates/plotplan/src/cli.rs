@@ -1,8 +1,9 @@
 //! What can be said on the command line.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use compiler::quantity;
+use compiler::{import, quantity};
 
 /// Compiles pen-plotter drawings (HPGL, HP-GL/2) to motor motion.
 ///
@@ -108,6 +109,13 @@ pub(crate) struct Reading {
     /// Take warnings for errors
     #[arg(long)]
     pub(crate) strict: bool,
+}
+
+impl Reading {
+    /// The options of the drawing's importer.
+    pub(crate) fn options(&self) -> import::Options {
+        import::Options { plotter: self.plotter.clone(), paper: self.paper.clone() }
+    }
 }
 
 /// How diagnostics are written.
@@ -515,4 +523,35 @@ fn place(text: &str) -> Result<(f64, f64), String> {
     let (x, y) =
         text.split_once(',').ok_or("a place is two lengths with a comma between, such as 10mm,2cm")?;
     Ok((length(x)?, length(y)?))
+}
+
+/// Options that choose files or the form of reports: the plan does not depend on them.
+const NOT_OF_THE_PLAN: [&str; 7] =
+    ["file", "machine", "output", "format", "report", "message_format", "strict"];
+
+/// The options of `convert` that shape the plan, as given, in the order of the help: with them, the
+/// same drawing and the same machine, `convert` makes the same plan.
+pub(crate) fn plan_options(matches: &ArgMatches) -> Vec<String> {
+    let Some(("convert", given)) = matches.subcommand() else {
+        return Vec::new();
+    };
+    let convert = Arguments::command().find_subcommand("convert").cloned().unwrap_or_default();
+    let mut options = Vec::new();
+    for argument in convert.get_arguments() {
+        let id = argument.get_id().as_str();
+        let (Some(long), Some(ValueSource::CommandLine)) = (argument.get_long(), given.value_source(id))
+        else {
+            continue;
+        };
+        if NOT_OF_THE_PLAN.contains(&id) {
+            continue;
+        }
+        if argument.get_action().takes_values() {
+            let values = given.get_raw(id).into_iter().flatten().map(|value| value.to_string_lossy());
+            options.push(format!("--{long}={}", values.collect::<Vec<_>>().join(",")));
+        } else {
+            options.push(format!("--{long}"));
+        }
+    }
+    options
 }

@@ -7,7 +7,6 @@ mod device;
 mod firmware;
 mod info;
 mod machine;
-mod motion;
 mod preview;
 mod send;
 mod verify;
@@ -23,10 +22,10 @@ use crate::cli::{self, Arguments, Command, Planning};
 use crate::failure::Failure;
 use crate::output;
 
-/// Does what the command line asks for.
-pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+/// Runs the command. `command_line` holds the options that shape a plan, as given.
+pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), Failure> {
     match &arguments.command {
-        Command::Convert(convert) => convert::run(convert),
+        Command::Convert(convert) => convert::run(convert, command_line),
         Command::Check(check) => check::run(check),
         Command::Info(info) => info::run(info),
         Command::Verify(verify) => verify::run(verify),
@@ -99,17 +98,17 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
         tolerance_mm: planning.tolerance,
         period_us: (period * 1e6).round().max(0.0) as u64,
         order,
-        wish: PlacementOptions { rotate_rad: planning.rotate.unwrap_or(0.0).to_radians(), scale: size },
+        placement: PlacementOptions { rotate_rad: planning.rotate.unwrap_or(0.0).to_radians(), scale: size },
         pen_speeds,
         // The pen is off the paper long before it is all the way up.
         lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
-        law: law(planning),
+        timing_law: timing_law(planning),
         allow_over_limit: planning.allow_over_limit,
     }
 }
 
 /// The law that the command line's words make.
-fn law(planning: &Planning) -> TimingLaw {
+fn timing_law(planning: &Planning) -> TimingLaw {
     let fixed_duration =
         |easing: Easing| TimingLaw::FixedDuration { easing, segment_time_s: planning.segment_time };
     match planning.law {

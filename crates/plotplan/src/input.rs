@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use compiler::import::{self, Document, Page, Severity};
 use compiler::machine_file::{MachineFile, PRESETS, nearest};
-use compiler::report;
+use compiler::report::text;
 use drawing::Drawing;
 use kinematics::Machine;
 
@@ -65,7 +65,7 @@ pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedD
     terminal::diagnostics(input, &document.diagnostics, arguments.message_format);
     let pages = document.pages.len();
     if arguments.page == 0 || arguments.page > pages {
-        let have = report::counted(pages, "page");
+        let have = text::pluralize(pages, "page");
         let what = format!("{} has {have}, not page {}", input.name, arguments.page);
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }

@@ -13,9 +13,10 @@ mod pseudo_terminal;
 mod terminal;
 
 fn main() -> ExitCode {
-    use clap::Parser as _;
-    let arguments = cli::Arguments::parse();
-    match command::run(&arguments) {
+    use clap::{CommandFactory as _, FromArgMatches as _};
+    let matches = cli::Arguments::command().get_matches();
+    let arguments = cli::Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    match command::run(&arguments, &cli::plan_options(&matches)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }

@@ -240,7 +240,7 @@ impl SendingProgress {
         let left = progress.of_us.saturating_sub(progress.done_us) as f64 * 1e-6;
         self.bar.set_length(progress.of_us / 1000);
         self.bar.set_position(progress.done_us / 1000);
-        let left = compiler::report::clock(left);
+        let left = compiler::report::text::duration(left);
         self.bar.set_message(format!("line {} of {}, {left} left", progress.lines, progress.of_lines));
     }
 

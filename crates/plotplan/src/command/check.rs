@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use compiler::import::Severity;
-use compiler::report::{counted, metres};
-use planner::placement;
+use compiler::pipeline;
+use compiler::report::text::{length, pluralize};
 
 use crate::cli::Check;
 use crate::failure::Failure;
@@ -27,8 +27,8 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
                 let _ = writeln!(
                     text,
                     "{}, {} of ink from {:.2}, {:.2} to {:.2}, {:.2} mm, pens {}",
-                    counted(drawing.strokes.len(), "stroke"),
-                    metres(drawing.length()),
+                    pluralize(drawing.strokes.len(), "stroke"),
+                    length(drawing.length()),
                     bounds.x0,
                     bounds.y0,
                     bounds.x1,
@@ -46,15 +46,10 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     if let Some(machine) = &machine {
         let drawing = drawn.drawing();
         let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
-        let placed = placement::place(&machine.machine, drawing, &request.wish).and_then(|map| {
-            let mut placed = drawing.clone();
-            placed.transform(map);
-            planner::check_reach(&machine.machine, &placed).map(|()| placed)
-        });
-        match placed {
+        match pipeline::place(drawing, &machine.machine, &request.placement) {
             Ok(placed) => {
                 let _ = writeln!(text, "{} can draw it", machine.machine.name());
-                let beyond = placement::beyond_sheet_mm(&machine.machine, &placed);
+                let beyond = placed.beyond_sheet_mm;
                 if beyond > 1e-6 {
                     terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));
                     if arguments.reading.strict {

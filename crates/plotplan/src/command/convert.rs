@@ -1,9 +1,10 @@
 //! `plotplan convert`: a drawing into a plan, or into a clean drawing.
 
 use annotate_snippets::Level;
-use compiler::import::{self, Page};
+use compiler::import;
 use compiler::pipeline::{self, Compiled, Request};
-use compiler::report;
+use compiler::report::{CertificateReport, Summary, text};
+use compiler::settings::Settings;
 use drawing::Drawing;
 use kinematics::Machine;
 use planner::PlanError;
@@ -12,11 +13,11 @@ use serde_json::json;
 
 use crate::cli::{Convert, Format, ReportForm};
 use crate::failure::Failure;
-use crate::input::{self, Input, LoadedMachine};
+use crate::input::{self, Input, LoadedDrawing, LoadedMachine};
 use crate::output;
 use crate::terminal::{self, Progress};
 
-pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Failure> {
     // What is wrong with the machine shows before a long read.
     let machine = match (arguments.format, &arguments.machine) {
         (Format::Hpgl | Format::Svg, _) => None,
@@ -40,7 +41,7 @@ pub(crate) fn run(arguments: &Convert) -> Result<(), Failure> {
         ));
     }
     match machine {
-        Some(machine) => plan(arguments, &input, drawn.page(), &machine),
+        Some(machine) => plan(arguments, command_line, &input, &drawn, &machine),
         None => write_drawing(arguments, drawn.drawing()),
     }
 }
@@ -55,7 +56,14 @@ fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> 
     })
 }
 
-fn plan(arguments: &Convert, input: &Input, page: &Page, machine: &LoadedMachine) -> Result<(), Failure> {
+fn plan(
+    arguments: &Convert,
+    command_line: &[String],
+    input: &Input,
+    drawn: &LoadedDrawing,
+    machine: &LoadedMachine,
+) -> Result<(), Failure> {
+    let page = drawn.page();
     let request = super::request(&arguments.planning, page, &machine.machine);
     let compiled = compile(input, &page.drawing, &machine.machine, &request)?;
     if compiled.beyond_sheet_mm > 1e-6 {
@@ -68,12 +76,12 @@ fn plan(arguments: &Convert, input: &Input, page: &Page, machine: &LoadedMachine
             return Err(Failure::Refused);
         }
     }
-    let summary = report::summary(&compiled);
-    let certificate = report::certificate(&compiled.certificate);
+    let summary = Summary::of(&compiled);
+    let certificate = CertificateReport::of(&compiled.certificate);
     let said = match arguments.report {
         ReportForm::Text => {
-            let text = report::summary_text(&machine.machine, &compiled);
-            format!("{text}{}", report::certificate_text(&compiled.certificate))
+            let text = text::summary(&machine.machine, &compiled);
+            format!("{text}{}", text::certificate(&compiled.certificate))
         }
         ReportForm::Json => format!("{}\n", json!({ "summary": summary, "certificate": certificate })),
     };
@@ -94,6 +102,8 @@ fn plan(arguments: &Convert, input: &Input, page: &Page, machine: &LoadedMachine
         terminal::say(&said);
         return Ok(());
     }
+    let reading = &arguments.reading;
+    let settings = Settings::of(&request, reading.page, &reading.options(), command_line.to_vec());
     let rows = || compiled.trajectory.rows().map(|row| row.row);
     output::write(&arguments.output, |out| {
         let written = match arguments.format {
@@ -105,9 +115,9 @@ fn plan(arguments: &Convert, input: &Input, page: &Page, machine: &LoadedMachine
                         sha256: import::sha256(&input.bytes),
                     },
                     machine: serde_json::to_value(&machine.file)?,
-                    settings: report::settings(&request),
-                    summary,
-                    certificate,
+                    settings: serde_json::to_value(&settings)?,
+                    summary: serde_json::to_value(&summary)?,
+                    certificate: serde_json::to_value(&certificate)?,
                 };
                 plan::file::json::write(&document, &compiled.header, rows, out)
             }
@@ -162,7 +172,7 @@ pub(super) fn explain(
         machine.sheet().x1,
         machine.sheet().y1,
     );
-    let fit = PlacementOptions { scale: Scale::Fit, ..request.wish };
+    let fit = PlacementOptions { scale: Scale::Fit, ..request.placement };
     let help = match place(machine, drawing, &fit) {
         Ok(map) => {
             let [a, b, ..] = map.as_coeffs();

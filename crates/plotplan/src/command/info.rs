@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use compiler::import::{Diagnostic, Fact};
-use compiler::report::{self, clock, counted, metres};
+use compiler::replay;
+use compiler::report::text::{self, duration, length, pluralize};
 
 use crate::cli::Info;
 use crate::failure::Failure;
@@ -42,8 +43,8 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
             continue;
         };
         let dots = drawing.strokes.iter().filter(|stroke| stroke.is_dot()).count();
-        let _ = writeln!(text, "strokes  {} ({})", drawing.strokes.len(), counted(dots, "dot"));
-        let _ = writeln!(text, "ink      {}", metres(drawing.length()));
+        let _ = writeln!(text, "strokes  {} ({})", drawing.strokes.len(), pluralize(dots, "dot"));
+        let _ = writeln!(text, "ink      {}", length(drawing.length()));
         let _ = writeln!(
             text,
             "bounds   {:.2}, {:.2} to {:.2}, {:.2} mm ({:.2} x {:.2})",
@@ -56,7 +57,7 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         );
         for pen in drawing.pens() {
             let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
-            let (count, length) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
+            let (count, ink_mm) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
             let settings = page.pens.get(&pen).copied().unwrap_or_default();
             let mut own = String::new();
             if let Some(speed) = settings.speed_mm_s {
@@ -65,7 +66,8 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
             if let Some(width) = settings.width_mm {
                 let _ = write!(own, ", {width:.2} mm wide");
             }
-            let _ = writeln!(text, "pen {:<4} {}, {}{own}", pen.0, counted(count, "stroke"), metres(length));
+            let _ =
+                writeln!(text, "pen {:<4} {}, {}{own}", pen.0, pluralize(count, "stroke"), length(ink_mm));
         }
     }
     text.push_str(&findings(&document.diagnostics));
@@ -73,8 +75,8 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
         let compiled = super::convert::compile(input, drawn.drawing(), &machine.machine, &request)?;
         text.push('\n');
-        text.push_str(&report::summary_text(&machine.machine, &compiled));
-        text.push_str(&report::certificate_text(&compiled.certificate));
+        text.push_str(&text::summary(&machine.machine, &compiled));
+        text.push_str(&text::certificate(&compiled.certificate));
     }
     Ok(text)
 }
@@ -96,7 +98,7 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
     let header = &plan.table.header;
     let mut text = format!("plan     {}\n", input.name);
     let _ = writeln!(text, "machine  {}", header.machine);
-    let _ = writeln!(text, "time     {}", clock(header.duration_us as f64 * 1e-6));
+    let _ = writeln!(text, "time     {}", duration(header.duration_us as f64 * 1e-6));
     let _ = writeln!(text, "rows     {} every {} us", header.rows, header.period_us);
     for motor in &header.motors {
         let limits = &motor.limits;
@@ -106,9 +108,9 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
             motor.name, limits.speed, limits.acceleration
         );
     }
-    let certificate = super::verify::replay(&plan, &machine.machine, None, TOLERANCE_MM);
-    let _ = writeln!(text, "ink      {}", metres(certificate.ink_mm));
-    let _ = writeln!(text, "travel   {}", metres(certificate.travel_mm));
+    let certificate = replay::certify(&plan, &machine.machine, None, TOLERANCE_MM);
+    let _ = writeln!(text, "ink      {}", length(certificate.ink_mm));
+    let _ = writeln!(text, "travel   {}", length(certificate.travel_mm));
     let _ = writeln!(text, "pens     {:?}, down {} times", certificate.pens, certificate.pen_downs);
     Ok(text)
 }

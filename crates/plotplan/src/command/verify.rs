@@ -2,14 +2,12 @@
 
 use anyhow::Context as _;
 use compiler::machine_file::MachineFile;
-use compiler::report;
-use drawing::{Affine, Drawing};
-use kinematics::Machine;
+use compiler::replay;
+use compiler::report::{CertificateReport, text};
+use drawing::Affine;
 use plan::file::PlanFile;
-use serde_json::{Value, json};
-use verify::Certificate;
+use serde_json::json;
 
-use super::motion::Motion;
 use crate::cli::{ReportForm, Verify};
 use crate::failure::Failure;
 use crate::input::{self, Input, LoadedMachine};
@@ -35,19 +33,17 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     };
     let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
-    let certificate = replay(&plan, &machine.machine, drawing.as_ref(), tolerance);
+    let certificate = replay::certify(&plan, &machine.machine, drawing.as_ref(), tolerance);
     let text = match (arguments.report, drawing.is_some()) {
-        (ReportForm::Text, true) => report::certificate_text(&certificate),
+        (ReportForm::Text, true) => text::certificate(&certificate),
         (ReportForm::Text, false) => {
             terminal::warning("without --drawing only the motion is verified, not what it draws");
-            report::motion_text(&certificate)
+            text::motion(&certificate)
         }
         (ReportForm::Json, compared) => {
-            let mut certificate = report::certificate(&certificate);
-            if !compared {
-                certificate["after_rounding"] = Value::Null;
-            }
-            format!("{}\n", json!({ "certificate": certificate }))
+            let report =
+                if compared { CertificateReport::of } else { CertificateReport::of_motion }(&certificate);
+            format!("{}\n", json!({ "certificate": report }))
         }
     };
     output::write("-", |out| out.write_all(text.as_bytes()))?;
@@ -73,26 +69,4 @@ pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, Lo
         (None, None) => input::machine(&plan.table.header.machine)?,
     };
     Ok((plan, machine))
-}
-
-/// Chords of a plan's own ink stay so close to it, as a share of the tolerance.
-const OWN_INK: f64 = 0.01;
-
-/// Replays a plan. Without a drawing there is nothing to hold its ink against but itself.
-pub(super) fn replay(
-    plan: &PlanFile,
-    machine: &Machine,
-    drawing: Option<&Drawing>,
-    tolerance: f64,
-) -> Certificate {
-    let own;
-    let drawing = if let Some(drawing) = drawing {
-        drawing
-    } else {
-        own = Motion::of(&plan.table.rows, machine, OWN_INK * tolerance.max(DEFAULT_TOLERANCE_MM)).drawing();
-        &own
-    };
-    verify::certify(machine, drawing, &plan.table.header, tolerance, || {
-        plan.table.rows.iter().map(|row| (*row, None))
-    })
 }

@@ -1,0 +1,59 @@
+//! Scenes for pictures: a drawing or a plan on its machine.
+
+use drawing::{Drawing, Point, Rect};
+use kinematics::{Machine, reach_outlines};
+use picture::{Ink, Scene};
+use plan::Row;
+
+use crate::replay::{Motion, Polyline};
+
+/// Chords of curves in a picture deviate by at most this, mm.
+const CHORD_MM: f64 = 0.02;
+
+/// A drawing without a machine: the sheet is the bounding box of its ink.
+pub fn of_drawing(title: &str, drawing: &Drawing) -> Scene {
+    let sheet = drawing.bounding_box().unwrap_or(Rect::ZERO);
+    scene(title, sheet, Vec::new(), drawing, None)
+}
+
+/// A placed drawing on its machine, in the file's order, with straight travel.
+pub fn of_placed(title: &str, drawing: &Drawing, machine: &Machine) -> Scene {
+    scene(title, machine.sheet(), reach_outlines(machine), drawing, Some(start_point(machine)))
+}
+
+/// The rows of a plan on its machine.
+pub fn of_plan(title: &str, rows: &[Row], machine: &Machine) -> Scene {
+    let Motion { ink, travel } = Motion::of(rows, machine, CHORD_MM);
+    Scene {
+        title: title.to_owned(),
+        sheet: machine.sheet(),
+        reach: reach_outlines(machine),
+        ink: ink.into_iter().map(|Polyline { pen, points }| Ink { pen, points }).collect(),
+        travel: travel.into_iter().map(|line| line.points).collect(),
+        start: Some(start_point(machine)),
+    }
+}
+
+fn start_point(machine: &Machine) -> Point {
+    machine.geometry().forward(&machine.start())
+}
+
+fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, start: Option<Point>) -> Scene {
+    let ink = drawing
+        .strokes
+        .iter()
+        .map(|stroke| Ink { pen: stroke.pen.0, points: stroke.flatten(CHORD_MM) })
+        .collect();
+    let mut here = start;
+    let mut travel = Vec::new();
+    for stroke in &drawing.strokes {
+        if let Some(from) = here {
+            travel.push(vec![from, stroke.start()]);
+        }
+        here = Some(stroke.end());
+    }
+    if let (Some(from), Some(to)) = (here, start) {
+        travel.push(vec![from, to]);
+    }
+    Scene { title: title.to_owned(), sheet, reach, ink, travel, start }
+}
