@@ -1,4 +1,5 @@
-//! The pictures of docs/planning.md: `cargo run -p plotplan-planner --example planning_pictures -- docs/pictures`.
+//! The pictures of docs/planning.md: `cargo run -p plotplan-planner --example planning_pictures --
+//! docs/pictures`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,10 +25,10 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A picture of the given size with a scale from the world (y up) to its frame, all in px.
+/// A picture with a map from world coordinates (y up) to its frame, in px.
 struct Picture {
     body: String,
-    /// Where the world's (x0, y0) and (x1, y1) lie.
+    /// The positions of the world's (x0, y0) and (x1, y1).
     frame: Rect,
     world: Rect,
 }
@@ -62,7 +63,7 @@ impl Picture {
         );
     }
 
-    /// The frame with a label below it, one above it, and numbers along both axes.
+    /// The frame with a label below, a label above, and numbers along both axes.
     fn axes(&mut self, below: &str, above: &str, steps: (f64, f64)) {
         let (frame, world) = (self.frame, self.world);
         let ticks = |from: f64, to: f64, step: f64| {
@@ -101,7 +102,7 @@ fn stroke_of(color: &str, width: f64) -> String {
     format!("stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"")
 }
 
-/// A right angle and a gentle turn, as drawn and as driven.
+/// A right angle and a smaller angle, as drawn and as planned.
 fn corner() -> String {
     let points = [(0.0, 0.0), (1.35, 0.0), (1.35, 0.9), (2.75, 1.25)].map(Point::from);
     let stroke = polyline(&points);
@@ -114,7 +115,7 @@ fn corner() -> String {
         row_mm: f64::INFINITY,
     };
     let mut picture = Picture::new(Rect::new(20.0, 20.0, 620.0, 340.0), Rect::new(-0.1, -0.2, 2.9, 1.4));
-    // Everything within the tolerance, as one broad line with round joints.
+    // The tolerance band, as a wide line with round joints.
     let broad = 2.0 * deviation * 200.0;
     let drawn = || points.iter().map(|p| (p.x, p.y));
     picture.line(
@@ -137,7 +138,7 @@ fn corner() -> String {
     picture.finish()
 }
 
-/// Speed along a path of corners and an arc, under what the motors allow at each place.
+/// Speed along a path of corners and an arc, and the largest speed the motors allow at each point.
 fn speed() -> Result<String, Failure> {
     let machine = corexy()?;
     let mut stroke =
@@ -202,7 +203,8 @@ fn pen_speed(section: &Section, piece: usize, s: f64) -> f64 {
     piece.rate * piece.curve.derivatives(s * piece.rate).0.hypot()
 }
 
-/// The largest ds/dt at one of a interval's samples: by the motors' speeds, and by what some d²s/dt² allows both.
+/// The largest ds/dt at a sample of an interval: under the motors' speed limits, and for which some
+/// d²s/dt² is feasible for both motors.
 fn most(machine: &Machine, interval: &GridInterval, sample: usize) -> f64 {
     let [a, b] = machine.motors();
     let (first, second) = (interval.first[sample], interval.second[sample]);
@@ -290,7 +292,7 @@ fn corexy() -> Result<Machine, Failure> {
     })?)
 }
 
-/// An arm of two links, 1 rad/s and 5 rad/s².
+/// An arm with two links, 1 rad/s and 5 rad/s².
 fn arm() -> Result<Machine, Failure> {
     let counts = 3200.0 / std::f64::consts::TAU;
     Ok(Machine::new(MachineParts {

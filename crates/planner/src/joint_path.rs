@@ -1,82 +1,89 @@
-//! Lifting the pen's path into joint space, adaptively, with what a time law must know.
+//! Joint paths: inverse kinematics along a section, on an adaptive grid, with the derivatives that
+//! time parametrization needs.
 
 use drawing::{Point, Segment, Vec2};
 use kinematics::{Fault, Geometry, JointPos, Machine, MotorPos, OutOfReach, Unreachable};
 
 use crate::path::{Piece, Section};
 
-/// A path in joint space that can be followed without stopping: what a time law is laid upon.
+/// A path in joint space that can be followed without stopping.
 ///
-/// The parameter `s` runs over the pen's pieces (mm) or over the share of the way from 0 to 1 (travel). The path is exact:
-/// positions come from the pen's own curve through the inverse kinematics, not from interpolation between nodes.
+/// The parameter `s` is that of the pen's pieces, in mm, or runs from 0 to 1 (travel). The path is
+/// exact: positions come from the pen's curve through inverse kinematics, not from interpolation
+/// between grid points.
 #[derive(Clone, Debug)]
 pub struct JointPath {
-    /// Where the path goes.
+    /// The geometry of the path.
     pub geometry: PathGeometry,
-    /// The intervals, in order, without gaps; at least one.
+    /// The grid intervals, in order, without gaps; at least one.
     pub intervals: Vec<GridInterval>,
 }
 
-/// Where a joint path goes.
+/// The geometry of a joint path.
 #[derive(Clone, Debug)]
 pub enum PathGeometry {
-    /// The pen follows these pieces, beginning in this pose.
+    /// The pen follows these pieces, starting in this pose.
     Drawn(JointPos, Section),
-    /// The joints go straight from one pose to the other; the pen is up.
+    /// The joints move linearly from one pose to the other, with the pen up.
     Travel(JointPos, JointPos),
 }
 
-/// A stretch of a joint path between two nodes.
+/// A part of a joint path between two grid points.
 #[derive(Clone, Copy, Debug)]
 pub struct GridInterval {
     /// Its length in the parameter `s`.
     pub length: f64,
-    /// Index of the piece it lies on, and where on it the interval begins, in `s`.
+    /// Index of the piece it lies on.
     pub piece: usize,
-    /// See `piece`.
+    /// Where on the piece the interval starts, in `s`.
     pub start: f64,
-    /// The motors' derivatives by `s` at its start, middle and end, ticks per unit. The two sides of a node differ where
-    /// pieces meet, so each interval has its own.
+    /// The motors' derivatives with respect to `s` at its start, middle and end, ticks per unit.
+    /// They may differ between the two sides of a grid point where pieces meet, so each interval
+    /// has its own.
     pub first: [MotorPos; 3],
     /// Second derivatives, likewise.
     pub second: [MotorPos; 3],
     /// Largest |dp/ds| of the pen.
     pub pen_speed: f64,
-    /// Bound on how much the pen's path bends against linear joint motion, for a unit of (ds/dt)², 1/mm: rows `T` apart
-    /// at even speed leave the curve by `(ds/dt)² T² second_derivative_bound / 8` at the most.
+    /// Bound on the second derivative of the pen's path relative to linear joint motion, 1/mm: with
+    /// rows `T` apart, motion at constant speed leaves the path by at most `(ds/dt)² T²
+    /// second_derivative_bound / 8`.
     pub second_derivative_bound: f64,
-    /// Whether rows also leave the curve by how the pen speeds up: by `|d²s/dt²| T² pen_speed / 8` more.
+    /// Whether acceleration along the path adds to that deviation: by `|d²s/dt²| T² pen_speed / 8`.
     pub near_corner: bool,
-    /// By how much the derivatives may exceed a straight line between the three samples, as a share of the limits: 0
-    /// where they are linear in `s` (lines and parabolas on machines whose kinematics are linear).
+    /// Bound on the error of linear interpolation of the derivatives between the three samples, as
+    /// a share of the limits; 0 where they are linear in `s` (lines and parabolas on linear
+    /// kinematics).
     pub interpolation_error: f64,
 }
 
-/// No joint turns by more over a interval, rad: no peak of a derivative can hide between its samples.
+/// Largest rotation of a joint over an interval, rad, so that no extremum of a derivative lies
+/// hidden between samples.
 const LARGEST_TURN: f64 = 0.15;
 
-/// How far the derivatives in the middle of a interval may be from the mean of its ends, as a share of what limits speed.
+/// Largest deviation of the derivatives in the middle of an interval from the mean of its ends, as
+/// a share of the constraint that limits the speed.
 const LARGEST_MIDPOINT_ERROR: f64 = 0.02;
 
-/// Cells are not cut shorter than this, mm.
+/// Shortest interval, mm.
 const SHORTEST: f64 = 1e-5;
 
-/// The path's derivatives at one place.
+/// The path's derivatives at one point.
 #[derive(Clone, Copy)]
 pub(crate) struct PathDerivatives {
-    /// Of the motors.
+    /// Of the motors, first.
     pub(crate) first: MotorPos,
-    /// Likewise.
+    /// Of the motors, second.
     pub(crate) second: MotorPos,
     /// See [`GridInterval::pen_speed`].
     pub(crate) pen_speed: f64,
-    /// Curvature times speed², 1/mm.
+    /// The component of p'' normal to the path, `|p' x p''| / |p'|` = curvature times |p'|², 1/mm.
     normal_second_derivative: f64,
     /// See [`GridInterval::second_derivative_bound`].
     pub(crate) second_derivative_bound: f64,
 }
 
-/// The path and its derivatives at one place.
+/// The path and its derivatives at one point.
 #[derive(Clone, Copy)]
 struct Sample {
     /// Position on the piece, in `s`.
@@ -87,7 +94,8 @@ struct Sample {
 }
 
 impl JointPath {
-    /// The straight way in joint space, along which all motors start and stop together. Nothing if there is no way to go.
+    /// The linear path in joint space, along which all motors start and stop together. Returns
+    /// `None` if the poses are equal.
     pub fn travel(machine: &Machine, from: JointPos, to: JointPos) -> Option<Self> {
         let change = machine.motor_rates(&(to - from));
         let pen_speed = travel_speed(machine, from, to);
@@ -107,15 +115,17 @@ impl JointPath {
         })
     }
 
-    /// Lifts a smooth section of the drawing, beginning at `pose`, which must hold the pen at its first point.
+    /// The joint path of a smooth section, starting at `pose`, which must hold the pen at the
+    /// section's first point.
     ///
-    /// Cells are bisected until (1) linear joint motion over a interval would stay within `tolerance` mm of the curve, by
-    /// the proved bound of [`kinematics::Geometry::second_derivative_bound`] plus the curve's own chord error; (2) no joint turns by more
-    /// than 0.15 rad over it; (3) the motors' derivatives in its middle are within a fiftieth of the mean of its ends,
-    /// as a share of what limits the pen.
+    /// Intervals are bisected until
+    /// 1. linear joint motion over an interval stays within `tolerance` mm of the curve, by
+    ///    [`kinematics::Geometry::second_derivative_bound`] plus the curve's own chord error;
+    /// 2. no joint rotates by more than 0.15 rad over it;
+    /// 3. the motors' derivatives in its middle are within 2 % of the mean of its ends, as a share
+    ///    of the constraint that limits the pen.
     ///
-    /// # Errors
-    /// When a point of it is out of reach, outside the joint limits or nearly singular.
+    /// # Errors If a point is out of reach, outside the joint limits or nearly singular.
     pub fn from_section(
         machine: &Machine,
         section: Section,
@@ -133,7 +143,7 @@ impl JointPath {
 }
 
 impl GridInterval {
-    /// The interval, cut in two so many times over.
+    /// Appends the interval, bisected `times` times.
     pub(crate) fn subdivide(
         &self,
         machine: &Machine,
@@ -147,8 +157,8 @@ impl GridInterval {
         }
     }
 
-    /// Two intervals in place of this one, with derivatives taken anew; nothing for travel, where there is nothing to gain,
-    /// and for intervals too short to be cut.
+    /// Two intervals in place of this one, with derivatives evaluated again; `None` for travel,
+    /// where nothing is gained, and for intervals that are too short.
     fn halves(&self, machine: &Machine, geometry: &PathGeometry) -> Option<[Self; 2]> {
         let PathGeometry::Drawn(_, section) = geometry else { return None };
         if self.length <= 2.0 * SHORTEST {
@@ -157,7 +167,7 @@ impl GridInterval {
         let piece = &section[self.piece];
         let at = |share: f64| {
             let t = ((self.start + share * self.length) * piece.rate).min(1.0);
-            // Derivatives are the same at every turn about the base.
+            // Derivatives do not depend on the turn about the base.
             let pose = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
             let (first, second) = motor_derivatives(machine, piece, t, &pose);
             Some((first, second))
@@ -168,7 +178,8 @@ impl GridInterval {
             let places = [places[from], places[from + 1], places[from + 2]];
             (places.map(|place| place.0), places.map(|place| place.1))
         });
-        // Of both halves, for where one of them has its second_derivative_bound change sign it shows none in its middle.
+        // The maximum over both halves: a half in which the third derivative changes sign shows no
+        // midpoint error.
         let midpoint_errors =
             parts.map(|(first, second)| midpoint_error(machine, self.pen_speed, &first, &second));
         let interpolation_error = 0.5 * midpoint_errors[0].max(midpoint_errors[1]);
@@ -180,21 +191,24 @@ impl GridInterval {
                 interpolation_error,
                 first,
                 second,
-                // What holds for all of the interval holds for its halves.
+                // Bounds over the interval hold for its halves.
                 ..*self
             }
         };
         Some([half(0), half(1)])
     }
 
-    /// Whether the motors move in proportion to the parameter, so that any even acceleration on it is even in the motors.
+    /// Whether the motor positions are linear in `s`, so that constant acceleration along the path
+    /// is constant in the motors.
     pub(crate) fn is_straight(&self) -> bool {
         self.second.iter().all(|second| *second == MotorPos::ZERO)
     }
 }
 
 impl PathGeometry {
-    /// The joints at `s` on a piece, exactly on the path; angles are unwrapped to the turn nearest to `near`.
+    /// The joints at `s` on a piece, exactly on the path, unwrapped to the turn nearest to `near`.
+    ///
+    /// # Errors If the point is out of reach; [`JointPath::from_section`] has excluded that.
     pub fn pose(
         &self,
         machine: &Machine,
@@ -227,14 +241,15 @@ struct Builder<'a> {
     intervals: Vec<GridInterval>,
 }
 
-/// How many intervals a curve begins with: enough that the three samples of a interval cannot miss a wave, and that a time law
-/// with one acceleration a interval comes near to the best.
+/// The number of intervals a curve starts with: enough that the three samples of an interval cannot
+/// miss an oscillation, and that one acceleration per interval is nearly optimal.
 fn initial_interval_count(piece: &Piece) -> usize {
     match &piece.curve {
         Segment::Line(_) => 1,
         Segment::Arc(arc) => (arc.sweep_rad.abs() / 0.2).ceil().clamp(2.0, 1e6) as usize,
         Segment::Cubic(cubic) => {
-            // The angle between the end tangents tells how much a blend turns; other cubics may wave between.
+            // The angle between the end tangents is how much a blend turns; other cubics may
+            // oscillate between.
             let (u, v) = (cubic.p1 - cubic.p0, cubic.p3 - cubic.p2);
             let turn = libm::atan2(u.cross(v).abs(), u.dot(v));
             (turn / 0.2).ceil().clamp(2.0, 8.0) as usize
@@ -243,7 +258,7 @@ fn initial_interval_count(piece: &Piece) -> usize {
 }
 
 impl Builder<'_> {
-    /// Lifts one piece and gives the pose at its end.
+    /// Adds the intervals of one piece and returns the pose at its end.
     fn add_piece(&mut self, index: usize, piece: &Piece, near: JointPos) -> Result<JointPos, OutOfReach> {
         let parts = initial_interval_count(piece);
         let length = piece.length();
@@ -256,7 +271,7 @@ impl Builder<'_> {
         Ok(from.pose)
     }
 
-    /// Adds the intervals between two samples, bisecting as long as one interval would not do.
+    /// Adds the intervals between two samples, bisecting as necessary.
     fn add_interval(
         &mut self,
         index: usize,
@@ -285,7 +300,7 @@ impl Builder<'_> {
                 pending.push((a, middle));
                 continue;
             }
-            // Only at a singular pose can a joint still jump over so short a way.
+            // Only near a singular pose can a joint move this far over so short a distance.
             if self.joint_change(&a, &b) > 1.0 {
                 let min = self.machine.parts().min_manipulability;
                 return Err(OutOfReach {
@@ -311,7 +326,8 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// By how much the derivatives leave the straight lines between the three samples, looked at half way.
+    /// Bound on the error of linear interpolation between the three samples, from samples in
+    /// between.
     fn interpolation_error(
         &self,
         piece: &Piece,
@@ -338,7 +354,7 @@ impl Builder<'_> {
         Ok(1.2 * interpolation_error)
     }
 
-    /// The most that a joint turns from one sample to the other, rad.
+    /// The largest rotation of a joint between two samples, rad.
     fn joint_change(&self, a: &Sample, b: &Sample) -> f64 {
         let angles = self.machine.geometry().joint_is_angle();
         let of = |k: usize| if angles[k] { (b.pose[k] - a.pose[k]).abs() } else { 0.0 };
@@ -370,11 +386,11 @@ impl Builder<'_> {
     }
 }
 
-/// A bound on |dp/ds| of the pen while the joints go straight from one pose to the other in s from 0 to 1, mm; 0 where no
-/// machine asks for it.
+/// A bound on |dp/ds| of the pen while the joints move linearly from one pose to the other in s
+/// from 0 to 1, mm; 0 if the machine has no limit on it.
 ///
-/// The way in `n` parts: `|dp/ds|` changes by `B` at the most over all of it, so by `B / n` between a part's ends, where B
-/// bounds the second derivative.
+/// With `n` equal parts and `B` a bound on the second derivative, `|dp/ds|` changes by at most `B /
+/// n` between the ends of a part, so it exceeds the larger end by at most half of that.
 pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f64 {
     const PARTS: u32 = 16;
     if machine.pen().max_travel_speed_mm_s == f64::INFINITY {
@@ -390,7 +406,8 @@ pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f
     fastest + 0.5 * geometry.second_derivative_bound(&from, &to) / f64::from(PARTS)
 }
 
-/// First and second derivatives of the motors by `s`, at a piece's own parameter `t`, where the pose is `pose`.
+/// First and second derivatives of the motors with respect to `s`, at the piece's own parameter
+/// `t`.
 fn motor_derivatives(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> (MotorPos, MotorPos) {
     let (velocity, acceleration) = piece.curve.derivatives(t);
     machine.motor_derivatives(pose, piece.rate * velocity, piece.rate * piece.rate * acceleration)
@@ -414,7 +431,8 @@ impl PathDerivatives {
         let geometry = machine.geometry();
         let (rates, _) = geometry.path_derivatives(pose, velocity, acceleration);
         let (first, second) = machine.motor_derivatives(pose, velocity, acceleration);
-        // Along a straight line an uneven parameter bends nothing; on a turn all of p'' may.
+        // A nonuniform parameter does not bend a straight line; on a curve take all of p'' as a
+        // bound.
         let bending =
             if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
         let second_derivative_bound = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
@@ -422,8 +440,9 @@ impl PathDerivatives {
     }
 }
 
-/// How far the motors' derivatives in the middle are from the mean of the ends, as a share of what limits the pen:
-/// speeds over the motors' limits, accelerations over theirs at the largest speed that could be reached here.
+/// The deviation of the motors' derivatives in the middle from the mean of the ends, as a share of
+/// the constraint that limits the pen: speeds relative to the motors' limits, accelerations
+/// relative to theirs at the largest speed attainable here.
 fn midpoint_error(machine: &Machine, pen_speed: f64, first: &[MotorPos; 3], second: &[MotorPos; 3]) -> f64 {
     let off = |x: [f64; 3]| (x[1] - 0.5 * (x[0] + x[2])).abs();
     let most = |x: [f64; 3]| x[0].abs().max(x[1].abs()).max(x[2].abs());

@@ -8,8 +8,8 @@ use crate::error::PlanError;
 /// Where and how large to place a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacementOptions {
-    /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding box
-    /// stays in place.
+    /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding
+    /// box stays in place.
     pub rotate_rad: f64,
     /// Size and position.
     pub scale: Scale,
@@ -69,8 +69,8 @@ pub fn place(machine: &Machine, drawing: &Drawing, options: &PlacementOptions) -
     }
 }
 
-/// The rotation that keeps the lower-left corner of the ink's bounding box in place. Multiples of 90
-/// degrees are exact.
+/// The rotation that keeps the lower-left corner of the ink's bounding box in place. Multiples of
+/// 90 degrees are exact.
 fn rotation_about_corner(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine {
     if angle == 0.0 {
         return Affine::IDENTITY;
@@ -100,9 +100,9 @@ const PRECISION: f64 = 1e-4;
 /// The set of placements that fit need not be convex (the half ring of a polar machine has a hole
 /// that a drawing may enclose), so this is a search: bisection over the scale, and for each scale a
 /// grid of translations from the center outwards, refined around the best. The search looks at a
-/// sample of the ink. The exact check of every segment then either accepts the placement or returns a
-/// violating point, which is added to the sample, and the search continues. Deterministic: ties are
-/// broken by the order of the grid.
+/// sample of the ink. The exact check of every segment then either accepts the placement or returns
+/// a violating point, which is added to the sample, and the search continues. Deterministic: ties
+/// are broken by the order of the grid.
 fn fit(machine: &Machine, drawing: &Drawing) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
     let sheet = machine.sheet();
@@ -132,8 +132,8 @@ struct Search<'a> {
     machine: &'a Machine,
     sheet: Rect,
     bounds: Rect,
-    /// The sample. A point that rules out a translation moves to the front, since it is likely to rule
-    /// out the next one.
+    /// The sample. A point that rules out a translation moves to the front, since it is likely to
+    /// rule out the next one.
     points: Vec<Point>,
 }
 
@@ -176,8 +176,8 @@ impl Search<'_> {
         (scale, shift)
     }
 
-    /// The translation nearest to the center, on the grid, that puts the scaled sample on the sheet and
-    /// within reach.
+    /// The translation nearest to the center, on the grid, that puts the scaled sample on the sheet
+    /// and within reach.
     fn translation(&mut self, scale: f64) -> Option<Vec2> {
         let (bounds, sheet) = (self.bounds, self.sheet);
         let low = Vec2::new(sheet.x0 - scale * bounds.x0, sheet.y0 - scale * bounds.y0);
@@ -202,8 +202,8 @@ impl Search<'_> {
     }
 }
 
-/// The points of a grid over the square from -1 to 1, `2 half + 1` per side, sorted by their distance
-/// from the center.
+/// The points of a grid over the square from -1 to 1, `2 half + 1` per side, sorted by their
+/// distance from the center.
 fn from_center(half: i32) -> Vec<(f64, f64)> {
     let mut cells: Vec<(i32, i32)> =
         (-half..=half).flat_map(|y| (-half..=half).map(move |x| (x, y))).collect();
@@ -217,8 +217,8 @@ fn on_sheet(sheet: Rect, p: Point) -> bool {
     p.x >= sheet.x0 - slack && p.x <= sheet.x1 + slack && p.y >= sheet.y0 - slack && p.y <= sheet.y1 + slack
 }
 
-/// Points of the ink: one for every cell of a grid over its bounding box that the ink passes through,
-/// and its extreme points.
+/// Points of the ink: one for every cell of a grid over its bounding box that the ink passes
+/// through, and its extreme points.
 fn sample(drawing: &Drawing, bounds: Rect) -> Vec<Point> {
     let side = bounds.width().max(bounds.height()) / SAMPLES_PER_SIDE;
     let mut taken = std::collections::BTreeSet::new();

@@ -12,8 +12,8 @@ use crate::{
 /// Planning settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Largest distance between the drawing's ink and the pen's continuous path, in both directions,
-    /// mm.
+    /// Largest distance between the drawing's ink and the pen's continuous path, in both
+    /// directions, mm.
     pub tolerance_mm: f64,
     /// Time between rows, microseconds.
     pub period_us: u64,

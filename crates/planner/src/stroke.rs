@@ -45,9 +45,10 @@ pub(crate) struct StrokePlanner<'a> {
 }
 
 impl StrokePlanner<'_> {
-    /// Plans a stroke from the first pose, in order of distance from `near`, from which all of it is
-    /// reachable: a stroke around the base may hit a joint limit from one turn but not from another.
-    /// `candidate` is the result for a predicted pose; it is used if the prediction was right.
+    /// Plans a stroke from the first pose, in order of distance from `near`, from which all of it
+    /// is reachable: a stroke around the base may hit a joint limit from one turn but not from
+    /// another. `candidate` is the result for a predicted pose; it is used if the prediction was
+    /// right.
     pub(crate) fn plan(
         &self,
         stroke: &Stroke,
@@ -86,9 +87,9 @@ impl StrokePlanner<'_> {
 
     /// Plans a stroke from a pose.
     ///
-    /// Blends deviate from the drawing by up to the tolerance. Where the drawing follows the boundary
-    /// of the reach, a blend may leave the reach: such a stroke is planned again without blends, with
-    /// a stop at every corner.
+    /// Blends deviate from the drawing by up to the tolerance. Where the drawing follows the
+    /// boundary of the reach, a blend may leave the reach: such a stroke is planned again without
+    /// blends, with a stop at every corner.
     pub(crate) fn plan_from(&self, stroke: &Stroke, pose: JointPos) -> Result<PlannedStroke, OutOfReach> {
         let exact = PathBudget { simplify_mm: 0.0, blend_mm: 0.0, ..self.budget.path };
         match self.settings.timing_law {

@@ -2,8 +2,8 @@
 //!
 //! Strokes are planned in batches of some thousand pieces, on all threads, and dropped once their
 //! rows are emitted: memory is proportional to the longest stroke. A stroke depends on its
-//! predecessors only through the turn about the base in which the machine arrives, so the rows do not
-//! depend on the number of threads.
+//! predecessors only through the turn about the base in which the machine arrives, so the rows do
+//! not depend on the number of threads.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -87,12 +87,12 @@ pub struct ExactRow {
     pub exact: [f64; 2],
 }
 
-/// Plans a drawing, given in machine mm, in the order of its strokes. The plan starts and ends at the
-/// machine's start pose, at rest, with the pen up.
+/// Plans a drawing, given in machine mm, in the order of its strokes. The plan starts and ends at
+/// the machine's start pose, at rest, with the pen up.
 ///
 /// # Errors
-/// [`PlanError::Setting`] if a setting is outside its valid range, [`PlanError::NoInk`] for an empty
-/// drawing, [`PlanError::OutOfReach`] with the first stroke that leaves the machine's reach.
+/// [`PlanError::Setting`] if a setting is outside its valid range, [`PlanError::NoInk`] for an
+/// empty drawing, [`PlanError::OutOfReach`] with the first stroke that leaves the machine's reach.
 pub fn plan<'a>(
     machine: &'a Machine,
     drawing: Drawing,
@@ -429,7 +429,8 @@ impl Cursor {
         }
         let phase = &profile.phases[self.phase];
         let s = phase.position_at((time - self.phase_start).max(0.0));
-        // No joint turns by half a turn between rows, so unwrapping to the last row's pose is unique.
+        // No joint turns by half a turn between rows, so unwrapping to the last row's pose is
+        // unique.
         let pose = geometry.pose(machine, phase.piece, s, near);
         pose.expect("the reach of the whole path was checked when it was planned")
     }

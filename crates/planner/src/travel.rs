@@ -11,8 +11,8 @@ pub fn travel_pose(machine: &Machine, point: Point) -> Option<JointPos> {
     machine.pose_near(point, &machine.start()).ok()
 }
 
-/// The time to lift the pen in one pose, travel to another in joint space and lower it there, s: the
-/// cost that ordering minimizes. Symmetric in the two poses.
+/// The time to lift the pen in one pose, travel to another in joint space and lower it there, s:
+/// the cost that ordering minimizes. Symmetric in the two poses.
 ///
 /// All motors start and stop together on a trapezoidal velocity profile. With `v` and `a` the
 /// smallest ratio of a motor's limit to its distance, the time is `2 / sqrt(a)` if the top speed is

@@ -1,5 +1,5 @@
-//! How much longer motions take under jerk limits than without, on the same path: `cargo test -p plotplan-planner --release --test jerk
-//! -- --nocapture` prints the table of docs/planning.md.
+//! The cost of jerk limits against motion without them, on the same path: `cargo test -p
+//! plotplan-planner --release --test jerk -- --nocapture` prints the table of docs/planning.md.
 
 use drawing::{EllipticArc, Pen, Point, Span, Stroke};
 use kinematics::Machine;
@@ -51,7 +51,7 @@ fn time(machine: &Machine, stroke: &Stroke) -> f64 {
 }
 
 #[test]
-fn jerk_limits_cost_what_building_up_acceleration_costs() {
+fn jerk_limits_duration_ratios() {
     println!("machine path                 0 ms     5 ms    20 ms   100 ms");
     let mut wrong = Vec::new();
     for (name, machine) in
@@ -63,8 +63,8 @@ fn jerk_limits_cost_what_building_up_acceleration_costs() {
             let times = builds.map(|build_up| time(&machines::with_jerk(&machine, build_up), &stroke));
             let ratios = times.map(|time| format!("{:8.4}", time / least));
             println!("{name:<7} {shape:<16} {least:>8.4} {}", ratios.join(" "));
-            // A rest costs at most the time in which the acceleration is built up: speeds and limits are as without.
-            // Every turn costs time too: a motor that changes its acceleration needs a build-up for that.
+            // A stop costs at most one build-up of the acceleration; so does every corner, where a
+            // motor changes its acceleration. Speeds and other limits are the same.
             for (time, build_up) in times.iter().zip(builds) {
                 let most = if shape == "0.03 mm" { 5.0 } else { 1.1 + 18.0 * build_up };
                 if !(*time >= least * (1.0 - 1e-6) && *time <= most * least) {

@@ -1,4 +1,6 @@
-//! Properties of whole plans: limits and tolerance hold in the emitted rows, whatever the drawing and the machine.
+//! Properties of whole plans: limits and tolerance hold in the emitted rows for any drawing and
+//! machine. These tests use the same kinematics as the planner; `tests/replay.rs` at the top level
+//! checks plans with independent forward kinematics.
 #![allow(clippy::unreadable_literal, reason = "inputs as a failing property gave them")]
 
 use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
@@ -23,7 +25,7 @@ fn polyline(points: Vec<Point>) -> Stroke {
     Stroke::polyline(Pen(1), points, Span::default()).expect("there are points")
 }
 
-/// Strokes inside the unit square: polylines, circles and ellipses, cubics, dots.
+/// Strokes in the unit square: polylines, circles and ellipses, cubics, dots.
 fn stroke() -> impl Strategy<Value = Stroke> {
     let point = || (0.0..1.0f64, 0.0..1.0f64).prop_map(|(x, y)| Point::new(x, y));
     let fine = (point(), 0.0..6.2f64, proptest::collection::vec(-0.4..0.4f64, 1..40)).prop_map(
@@ -71,7 +73,7 @@ fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {
     placed
 }
 
-/// Rows with the pauses filled in, so that all are one period apart.
+/// Rows with pauses filled in, so that all are one period apart.
 fn filled(rows: &[ExactRow], period_us: u64) -> Vec<[f64; 2]> {
     let mut all = vec![rows[0].exact; 3]; // at rest before the first row
     for pair in rows.windows(2) {
@@ -102,8 +104,9 @@ fn to_polyline(p: Point, line: &[Point]) -> f64 {
     line.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min)
 }
 
-/// |first difference| <= v T, |second difference| <= a T² and |third difference| <= j T³ in the exact positions of every row,
-/// and the pen's continuous path within the tolerance of the drawing, both ways.
+/// Checks |first difference| <= v T, |second difference| <= a T² and |third difference| <= j T³ in
+/// the exact positions of every row, and that the pen's continuous path is within the tolerance of
+/// the drawing, in both directions.
 fn stays_within(
     machine: &Machine,
     drawing: &Drawing,
@@ -126,7 +129,8 @@ fn stays_within(
     prop_assert!(rows.windows(2).all(|w| w[1].row.t_us > w[0].row.t_us));
 
     let all = filled(&rows, period_us);
-    // Under jerk limits accelerations are held in places, and between them as far as samples show.
+    // With jerk limits, accelerations are enforced at grid points, and between them as far as
+    // samples show.
     let slack = if machine.motors()[0].max_jerk_ticks_s3.is_some() { 1e-4 } else { 1e-6 };
     for (k, motor) in machine.motors().iter().enumerate() {
         for w in all.windows(3) {
@@ -194,9 +198,9 @@ fn stays_within(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
-    /// Whatever the drawing, the machine, the tolerance and the period.
+    /// For any drawing, machine, tolerance and period.
     #[test]
-    fn limits_and_tolerance_hold(
+    fn limits_and_tolerance_of_random_plans(
         machine in machine(), drawing in drawing(),
         tolerance in prop_oneof![Just(0.1), 0.005..1.0f64],
         period_us in prop_oneof![Just(10_000u64), 500..60_000u64],
@@ -215,7 +219,7 @@ fn line(points: &[(f64, f64)]) -> Drawing {
 }
 
 #[test]
-fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
+fn straight_corexy_line_is_time_optimal_trapezoid() {
     let machine = machines::corexy();
     let mut parts = machine.parts().clone();
     parts.pen.max_speed_mm_s = 1e9;
@@ -228,7 +232,7 @@ fn a_straight_corexy_line_is_the_time_optimal_trapezoid() {
 }
 
 #[test]
-fn the_pen_rests_for_the_whole_of_every_lift_and_drop() {
+fn motors_rest_during_lift_and_drop() {
     let machine = machines::arm();
     let trajectory = plan(&machine, line(&[(50.0, 200.0), (60.0, 210.0)]), &settings()).unwrap();
     let rows: Vec<ExactRow> = trajectory.rows().collect();
@@ -241,9 +245,9 @@ fn the_pen_rests_for_the_whole_of_every_lift_and_drop() {
 }
 
 #[test]
-fn travel_may_begin_before_a_lift_ends_and_never_ends_before_it() {
+fn travel_overlap_with_lift() {
     let machine = machines::corexy();
-    // The second stroke begins where the first one ends: there is nothing to travel meanwhile.
+    // The second stroke starts where the first one ends: there is no travel to overlap with.
     let strokes =
         [line(&[(50.0, 20.0), (60.0, 20.0)]), line(&[(60.0, 20.0), (60.0, 30.0)]), line(&[(90.0, 30.0)])];
     let drawing = Drawing { strokes: strokes.into_iter().flat_map(|drawing| drawing.strokes).collect() };
@@ -258,13 +262,13 @@ fn travel_may_begin_before_a_lift_ends_and_never_ends_before_it() {
         };
         lifted.map(wait).collect()
     };
-    // The last row at which the motors still stand is the one before they are seen to have moved.
+    // The last row in which the motors rest is the one before they have moved.
     assert_eq!(waits(&settings()), [120_000, 130_000, 130_000]);
     assert_eq!(waits(&overlapping), [120_000, 70_000, 70_000]);
 }
 
 #[test]
-fn a_dot_is_a_pen_that_goes_down_and_up() {
+fn dot_is_dwell_with_pen_down() {
     let machine = machines::corexy();
     let trajectory = plan(&machine, line(&[(50.0, 20.0)]), &settings()).unwrap();
     let down: Vec<ExactRow> = trajectory.rows().filter(|row| row.row.pen == 1).collect();
@@ -273,7 +277,7 @@ fn a_dot_is_a_pen_that_goes_down_and_up() {
 }
 
 #[test]
-fn a_stroke_that_leaves_the_reach_is_named_with_its_place() {
+fn out_of_reach_error_names_stroke_and_point() {
     let machine = machines::polar();
     let error = plan(&machine, line(&[(-60.0, 20.0), (60.0, 20.0)]), &settings()).unwrap_err();
     let PlanError::OutOfReach { stroke, span, source, .. } = error else { panic!("{error}") };
@@ -282,7 +286,7 @@ fn a_stroke_that_leaves_the_reach_is_named_with_its_place() {
 }
 
 #[test]
-fn a_pen_can_be_slower_than_the_machine() {
+fn pen_speed_below_machine_limit() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (110.0, 10.0)]);
     let slow = Settings { pen_speeds_mm_s: vec![(Pen(1), 5.0), (Pen(2), 1.0)], ..settings() };
@@ -290,10 +294,10 @@ fn a_pen_can_be_slower_than_the_machine() {
     assert!((20.0..20.2).contains(&seconds), "{seconds}");
 }
 
-/// Found by the property below: rows 42 ms apart cut a corner of 175 degrees by more than the tolerance, because the pen
-/// came off the straight way into it too fast.
+/// Found by the property below: rows 42 ms apart cut a corner of 175 degrees by more than the
+/// tolerance, because the pen left the line before it too fast.
 #[test]
-fn a_sharp_corner_at_a_long_period_is_not_cut() {
+fn sharp_corner_at_long_period_within_tolerance() {
     let machine = machines::arm();
     let drawing = line(&[(0.692, 0.39), (0.175, 0.913), (0.912, 0.372), (0.479, 0.98), (0.0, 0.987)]);
     let placed = fitted(&machine, &drawing);
@@ -309,20 +313,20 @@ fn a_sharp_corner_at_a_long_period_is_not_cut() {
 }
 
 #[test]
-fn an_empty_drawing_is_refused() {
+fn empty_drawing_is_an_error() {
     let machine = machines::corexy();
     assert_eq!(plan(&machine, Drawing::default(), &settings()).unwrap_err(), PlanError::NoInk);
 }
 
 #[test]
-fn life_size_puts_the_origin_at_the_sheets_corner() {
+fn default_placement_origin_at_sheet_corner() {
     let machine = machines::arm();
     let map = place(&machine, &line(&[(0.0, 0.0), (10.0, 10.0)]), &PlacementOptions::default()).unwrap();
     assert_eq!(map.as_coeffs(), [1.0, 0.0, 0.0, 1.0, 12.7, 76.2]);
 }
 
 #[test]
-fn a_quarter_turn_keeps_the_lower_left_corner_of_the_ink() {
+fn quarter_turn_keeps_lower_left_corner() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 20.0), (40.0, 60.0)]);
     let options = PlacementOptions { rotate_rad: std::f64::consts::FRAC_PI_2, ..PlacementOptions::default() };
@@ -332,7 +336,7 @@ fn a_quarter_turn_keeps_the_lower_left_corner_of_the_ink() {
 }
 
 #[test]
-fn fitting_fills_a_sheet() {
+fn fit_fills_sheet() {
     let machine = machines::corexy();
     let placed = fitted(&machine, &line(&[(3.0, 5.0), (23.0, 5.0), (23.0, 15.0)]));
     let ink = placed.bounding_box().unwrap();
@@ -342,20 +346,21 @@ fn fitting_fills_a_sheet() {
     );
 }
 
-/// The half ring's best place for a full square: side a with its lower edge tangent to the inner circle or its lower
-/// corners on the base line beside it. Above the hole: (a/2)² + (48 + a)² = 138² gives a = 83.53 mm. Beside the hole: from
-/// x to x + a with x = 48 at y = 0: (48 + a)² + a² = 138² gives a = 70.58 mm. So the best is 83.53 mm.
+/// The best placement of a full square on the half ring, with side a: its lower edge is tangent to
+/// the inner circle, or its lower corners are on the base line beside it. Above the hole: (a/2)² +
+/// (48 + a)² = 138² gives a = 83.53 mm. Beside the hole, from x to x + a with x = 48 at y = 0: (48
+/// + a)² + a² = 138² gives a = 70.58 mm. So the best is 83.53 mm.
 #[test]
-fn fitting_finds_the_largest_square_in_a_half_ring() {
+fn fit_largest_square_in_half_ring() {
     let machine = machines::polar();
     let square = line(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]);
     let side = fitted(&machine, &square).bounding_box().unwrap().width();
     assert!(side > 83.53 * 0.9995 && side <= 83.53, "{side}");
 }
 
-/// An arch can lie around the hole, where a filled rectangle of its size could not.
+/// An arch can enclose the hole, which a filled rectangle of its size cannot.
 #[test]
-fn fitting_lays_an_arch_around_the_hole() {
+fn fit_arch_around_hole() {
     let machine = machines::polar();
     let mut arch = Stroke::new(Pen(1), Point::new(10.0, 0.0), Span::default());
     arch.arc(EllipticArc::circular(Point::ZERO, 10.0, 0.0, std::f64::consts::PI));
@@ -365,7 +370,7 @@ fn fitting_lays_an_arch_around_the_hole() {
 }
 
 #[test]
-fn laws_with_a_given_time_give_it_to_every_piece() {
+fn fixed_duration_of_every_piece() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0), (10.0, 10.0)]);
     for easing in [Easing::Linear, Easing::SineOut, Easing::QuadraticInOut] {
@@ -373,7 +378,7 @@ fn laws_with_a_given_time_give_it_to_every_piece() {
         let trajectory =
             plan(&machine, drawing.clone(), &Settings { timing_law: law, ..settings() }).unwrap();
         assert!((trajectory.times().drawing_s - 3.0 * 0.5).abs() < 1e-9);
-        // Half way in time: x, sin(pi / 4) and a half.
+        // At half of the duration: x, sin(pi / 4) and one half.
         let down = trajectory.rows().position(|row| row.row.pen == 1).unwrap();
         let share = match easing {
             Easing::SineOut => std::f64::consts::FRAC_1_SQRT_2,
@@ -386,7 +391,7 @@ fn laws_with_a_given_time_give_it_to_every_piece() {
 }
 
 #[test]
-fn a_trapezoid_rests_at_every_vertex() {
+fn trapezoid_law_stops_at_every_vertex() {
     let machine = machines::corexy();
     let drawing = line(&[(10.0, 10.0), (60.0, 10.0), (60.0, 20.0)]);
     let exact = plan(&machine, drawing.clone(), &Settings { timing_law: TimingLaw::Trapezoid, ..settings() })
@@ -397,7 +402,7 @@ fn a_trapezoid_rests_at_every_vertex() {
 }
 
 #[test]
-fn travel_keeps_to_the_pens_travel_speed() {
+fn travel_within_pen_travel_speed() {
     for plain in [machines::arm(), machines::polar(), machines::corexy()] {
         for machine in [plain.clone(), machines::with_jerk(&plain, 0.05)] {
             let mut parts = machine.parts().clone();
@@ -420,9 +425,10 @@ fn travel_keeps_to_the_pens_travel_speed() {
     }
 }
 
-/// Between the three places of a cell that the jerk-limited law holds to the speed it once was 1.4e-5 too fast.
+/// Between the three points of an interval where the jerk-limited profile enforces the speed limit
+/// it exceeded it by 1.4e-5.
 #[test]
-fn speed_is_held_where_it_peaks_inside_a_cell() {
+fn speed_limit_at_peak_inside_interval() {
     let machine = machines::with_jerk(&machines::corexy(), 30_000.0 / 442_285.862_718_370_57);
     let bend = [
         (0.946543, 0.0),
@@ -468,10 +474,10 @@ fn speed_is_held_where_it_peaks_inside_a_cell() {
     stays_within(&machine, &line(&bend), 0.8413946210764377, 518).unwrap();
 }
 
-/// Where the motors' derivatives bend the other way in the middle of a cell its three samples show nothing of it: a
-/// motor once accelerated by 3.2e-5 too much.
+/// Where the motors' third derivatives change sign in the middle of an interval, its three samples
+/// do not show it: a motor exceeded its acceleration by 3.2e-5.
 #[test]
-fn acceleration_is_held_where_the_bend_of_the_derivatives_changes_sign() {
+fn acceleration_limit_at_third_derivative_sign_change() {
     let mut wave = Stroke::new(Pen(3), Point::new(0.37586856120206713, 0.06763253810793711), Span::default());
     wave.cubic_to(
         Point::new(0.0, 0.6696081783981291),
@@ -490,9 +496,10 @@ fn acceleration_is_held_where_the_bend_of_the_derivatives_changes_sign() {
     stays_within(&machines::arm(), &drawing, 0.1, 10_000).unwrap();
 }
 
-/// On an ellipse about a turning rail accelerations peak between five places of a cell: they once were 5.6e-4 too large.
+/// On an ellipse on the polar machine, accelerations have a maximum between five points of an
+/// interval: they exceeded the limit by 5.6e-4.
 #[test]
-fn acceleration_is_held_between_the_places_of_a_jerk_limited_cell() {
+fn acceleration_limit_between_points_of_jerk_interval() {
     let machine = machines::with_jerk(&machines::polar(), 6000.0 / 88_539.931_381_337_32);
     let arc = EllipticArc {
         center: Point::new(0.5748581417638099, 0.15942215694678485),

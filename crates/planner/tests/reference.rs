@@ -1,13 +1,15 @@
-//! How near the time law is to the best there is, shown from both sides on the same path.
+//! Optimality of the time parametrization, bounded from both sides on the same path.
 //!
-//! **From above**, a convex program on a fine grid (Verscheure et al. 2009), solved by an interior-point method: with
-//! b = (ds/dt)² at the grid's nodes and linear between them it minimises `Σ 2 Δs / (√b_i + √b_{i+1})` under the motors'
-//! speed and acceleration at every grid cell's start, middle and end. It is refined until it no longer changes.
+//! **From above**, a convex program on a fine grid (Verscheure et al. 2009), solved by an
+//! interior-point method: with b = (ds/dt)² at the grid points and linear between them it minimizes
+//! `Σ 2 Δs / (√b_i + √b_{i+1})` under the motors' speed and acceleration limits at the start,
+//! middle and end of every interval. The grid is refined until the result converges.
 //!
-//! **From below**, what every motion along the path must obey, whatever its grid. The acceleration of motor k is
-//! `(m' √b)' √b`, so `|½ d(m'² b)/ds| <= a |m'|`: between two places the square of a motor's speed changes by no more than
-//! `2 a ∫|m'| ds`, and at each place b is at most what some acceleration allows both motors. The largest b that
-//! obeys this at all nodes comes from sweeps; between nodes a motor cannot be faster than a trapezoid. No time law is
+//! **From below**, what every motion along the path satisfies on any grid. The acceleration of
+//! motor k is `(m' √b)' √b`, so `|½ d(m'² b)/ds| <= a |m'|`: between two points the square of a
+//! motor's speed changes by at most `2 a ∫|m'| ds`, and at each point b is at most what some
+//! acceleration allows both motors. Two passes give the largest b that satisfies this at all grid
+//! points; between them a motor is at best as fast as on a trapezoidal profile. No profile is
 //! faster than the sum.
 
 use clarabel::algebra::CscMatrix;
@@ -23,7 +25,8 @@ use proptest::prelude::*;
 
 mod machines;
 
-/// Corners by 0.05 mm, nothing else: the rows' share of the tolerance is another matter.
+/// Corners blended within 0.05 mm, and nothing else: the rows' share of the tolerance does not
+/// matter here.
 const BUDGET: PathBudget = PathBudget {
     chord_mm: 0.01,
     simplify_mm: 0.0,
@@ -32,13 +35,13 @@ const BUDGET: PathBudget = PathBudget {
     row_mm: f64::INFINITY,
 };
 
-/// By how much a profile may take longer than the best, as a share.
+/// Largest relative excess of a profile's duration over the optimum.
 const EXCESS: f64 = 0.002;
 
-/// The same with rows 10 ms apart, where cells are not cut as short.
+/// The same with rows 10 ms apart, where intervals are bisected less.
 const COARSE_EXCESS: f64 = 0.005;
 
-/// The path and the motors at one place, from one side.
+/// The path and the motors at one point, from one side.
 #[derive(Clone, Copy)]
 struct Place {
     ticks: MotorPos,
@@ -47,7 +50,7 @@ struct Place {
     pen_speed: f64,
 }
 
-/// A cell of the reference's grid.
+/// An interval of the reference's grid.
 struct Cell {
     length: f64,
     /// At its start, middle and end.
@@ -65,7 +68,7 @@ fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut JointPos) -> Place
     Place { ticks: machine.motor_positions(near), first, second, pen_speed: velocity.hypot2().sqrt() }
 }
 
-/// Every cell of the path in `parts` parts, and none longer than the whole path's length by `50 parts`.
+/// Every interval of the path in `parts` parts, none longer than the path's length / (50 `parts`).
 fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
     let PathGeometry::Drawn(start, section) = &path.geometry else { unreachable!("strokes are drawn") };
     let longest = path.intervals.iter().map(|cell| cell.length).sum::<f64>() / (50 * parts) as f64;
@@ -84,7 +87,7 @@ fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
                 if start.first[motor] * end.first[motor] >= 0.0 {
                     return (end.ticks[motor] - start.ticks[motor]).abs();
                 }
-                // It turns back on the way: where?
+                // The motor reverses: find out where.
                 let (mut low, mut high) = (0.0, 1.0);
                 for _ in 0..50 {
                     let middle = 0.5 * (low + high);
@@ -100,7 +103,7 @@ fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
     grid
 }
 
-/// The largest b at which the motors' and the pen's speeds hold.
+/// The largest b under the motors' and the pen's speed limits.
 fn by_speed(machine: &Machine, place: &Place, pen: f64) -> f64 {
     let motors = machine.motors().iter().enumerate();
     let speeds = motors.map(|(k, motor)| motor.max_speed_ticks_s / place.first[k].abs());
@@ -108,14 +111,14 @@ fn by_speed(machine: &Machine, place: &Place, pen: f64) -> f64 {
     speed * speed
 }
 
-/// The largest b at which some u fulfils `|m' u + m'' b| <= a` for both motors.
+/// The largest b for which some u satisfies `|m' u + m'' b| <= a` for both motors.
 fn by_acceleration(machine: &Machine, place: &Place) -> f64 {
     let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration_ticks_s2);
     let (first, second) = (place.first, place.second);
     (a * first[1].abs() + b * first[0].abs()) / (first[0] * second[1] - first[1] * second[0]).abs()
 }
 
-/// A time that no motion along the path can be faster than, s.
+/// A lower bound on the duration of any motion along the path, s.
 fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     let at_most = |place: &Place| by_speed(machine, place, pen).min(by_acceleration(machine, place));
     let mut b = vec![0.0; grid.len() + 1];
@@ -123,7 +126,7 @@ fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
         b[k] = at_most(&grid[k - 1].places[2]).min(at_most(&grid[k].places[0]));
     }
     let motors = machine.motors();
-    // What b may be at one end of a cell because of what it is at the other.
+    // The bound on b at one end of an interval that follows from b at the other.
     let reached = |cell: &Cell, from: &Place, to: &Place, b: f64| {
         let by = |k: usize| {
             let squared_speed =
@@ -156,14 +159,15 @@ fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     grid.iter().enumerate().map(time).sum()
 }
 
-/// The shortest time on the grid, s.
+/// The shortest duration on the grid, s.
 fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     let count = grid.len();
     let fastest =
         |cell: &Cell| by_speed(machine, &cell.places[0], pen).min(by_speed(machine, &cell.places[2], pen));
-    // All b as a share of the largest there can be: the solver likes numbers near 1.
+    // All b relative to the largest possible b, which improves the conditioning.
     let unit = grid.iter().map(fastest).fold(0.0, f64::max);
-    // Unknowns: b at the inner nodes, c <= √b there, and d >= 1 / (c + c of the next node) for every cell.
+    // Unknowns: b at the inner grid points, c <= √b there, and d >= 1 / (c + c of the next point)
+    // for every interval.
     let inner = count - 1;
     let (c0, d0) = (inner, 2 * inner);
     let mut rows = Rows::default();
@@ -218,7 +222,7 @@ fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     solver.solve();
     let status = solver.solution.status;
     assert!(matches!(status, SolverStatus::Solved | SolverStatus::AlmostSolved), "{status:?}");
-    // Not the solver's own sum, which trusts its d, but the time that its b take.
+    // Not the solver's objective, which contains its d, but the duration for its b.
     let speed = |node: usize| b(node).map_or(0.0, |index| (unit * solver.solution.x[index].max(0.0)).sqrt());
     grid.iter().enumerate().map(|(k, cell)| 2.0 * cell.length / (speed(k) + speed(k + 1))).sum()
 }
@@ -252,7 +256,7 @@ impl Rows {
     }
 }
 
-/// The joint paths of a stroke, one a section.
+/// The joint paths of a stroke, one per section.
 fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
     let mut near = machine.start();
     let mut paths = Vec::new();
@@ -265,7 +269,7 @@ fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
     paths
 }
 
-/// Time of our law over all sections, s.
+/// Duration of the planner's profiles over all sections, s.
 fn ours(machine: &Machine, paths: &[JointPath], pen: f64, period: f64) -> f64 {
     let cap = SpeedCap { pen_mm_s: pen, row_deviation_mm: f64::INFINITY, period_s: period };
     paths.iter().map(|path| profile(machine, path, &cap).duration_s).sum()
@@ -293,7 +297,7 @@ fn line_and_circle() -> Stroke {
     stroke
 }
 
-/// A dense wave: short pieces whose blends share them.
+/// A dense wave: short pieces shared by neighboring blends.
 fn wave() -> Stroke {
     let point = |k: u32| {
         let x = f64::from(k) * 0.5;
@@ -302,14 +306,14 @@ fn wave() -> Stroke {
     polyline(&(0..60).map(point).collect::<Vec<_>>())
 }
 
-/// Steps back and forth with every corner sharp, as in hatching.
+/// Sharp corners back and forth, as in hatching.
 fn zigzag() -> Stroke {
     let point = |k: u32| (40.0 + 0.35 * f64::from(k), if k.is_multiple_of(2) { 90.0 } else { 93.0 });
     polyline(&(0..16).map(point).collect::<Vec<_>>())
 }
 
 #[test]
-fn profiles_are_near_the_best() {
+fn profile_durations_near_optimum() {
     type Case = (&'static str, fn() -> Stroke);
     let shapes: [Case; 4] =
         [("corners", corners), ("line and circle", line_and_circle), ("wave", wave), ("zigzag", zigzag)];
@@ -326,7 +330,8 @@ fn profiles_are_near_the_best() {
                 let program = |parts: usize| -> f64 {
                     paths.iter().map(|path| convex_program(machine, &grid(machine, path, parts), pen)).sum()
                 };
-                // The error of a grid with one acceleration a cell is proportional to its cells: half of them, half of it.
+                // The error of a grid with one acceleration per interval is proportional to the
+                // interval length.
                 let (mut parts, mut coarse, mut fine) = (4, program(2), program(4));
                 while (coarse - fine).abs() > 1e-3 * fine && parts < 16 {
                     parts *= 2;
@@ -359,9 +364,9 @@ fn profiles_are_near_the_best() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Random polylines: never faster than anything can be, and near to it.
+    /// Random polylines: never faster than the lower bound, and close to it.
     #[test]
-    fn profiles_are_near_the_lower_bound(
+    fn profile_durations_near_lower_bound(
         machine in prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())],
         turns in proptest::collection::vec((-2.5..2.5f64, 0.2..6.0f64), 2..10),
     ) {

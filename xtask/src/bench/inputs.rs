@@ -1,4 +1,5 @@
-//! HPGL of eight kinds to read, of 1 MB and 10 MB each, where the generator that others were measured on is not at hand.
+//! Eight kinds of HPGL input, of 1 MB and 10 MB each, generated where the generator used for other
+//! readers is not available.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -36,7 +37,7 @@ pub(super) fn write(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Numbers without pattern, the same at every run (Marsaglia 2003, xorshift).
+/// Pseudo-random numbers (xorshift, Marsaglia 2003), the same in every run.
 struct Chance(u64);
 
 impl Chance {
@@ -53,7 +54,7 @@ fn say(bytes: &mut Vec<u8>, text: &str) {
     bytes.extend(text.as_bytes());
 }
 
-/// A stroke of a glyph: two to eight points near one another.
+/// A stroke of a glyph: two to eight points close to one another.
 fn glyph(chance: &mut Chance) -> Vec<(i32, i32)> {
     let (x, y) = (chance.up_to(WIDTH - 100.0), chance.up_to(HEIGHT - 100.0));
     let count = 2 + chance.up_to(7.0) as usize;
@@ -66,7 +67,7 @@ fn text(bytes: &mut Vec<u8>, chance: &mut Chance) {
     }
 }
 
-/// The same, in the ways of producers that save on separators.
+/// The same with the spellings of programs that save separators.
 fn bare(bytes: &mut Vec<u8>, chance: &mut Chance) {
     let points = glyph(chance);
     let (x, y) = points[0];
@@ -136,7 +137,8 @@ fn labels(bytes: &mut Vec<u8>, chance: &mut Chance) {
     say(bytes, "\x03\r\n");
 }
 
-/// The curve of `flow` as an encoded polyline: its first point absolute with the pen up, then steps.
+/// The curve of `flow` as an encoded polyline: its first point absolute with the pen up, then
+/// relative steps.
 fn encoded(bytes: &mut Vec<u8>, chance: &mut Chance, base: u32) {
     let points = curve(chance);
     say(bytes, if base == 64 { "PE<=" } else { "PE7<=" });
@@ -163,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_is_clean_hpgl() {
+    fn generated_inputs_have_no_diagnostics() {
         for make in
             [text, flow, hatch, arcs, labels, bare, |b, c| encoded(b, c, 64), |b, c| encoded(b, c, 32)]
                 as [fn(&mut Vec<u8>, &mut Chance); 8]

@@ -1,5 +1,5 @@
-//! `cargo xtask bench plan`: how long the planner's workload takes to draw, whether the motors stay inside their limits,
-//! and how fast all of it is computed; toppra (Pham & Pham) beside it where it is installed.
+//! `cargo xtask bench plan`: duration of the planner's workload, limit checks, and CPU time of
+//! every stage; beside it toppra (Pham & Pham) if it is installed.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,20 +17,21 @@ use planner::{Settings, Trajectory};
 
 use super::{fastest, workload};
 
-/// The workload's points, and ten times as many for how cost grows.
+/// Number of points in the workload. Growth is measured against ten times as many.
 const POINTS: usize = 10_000;
 const TOLERANCE: f64 = 0.05;
-/// Time between the rows in which accelerations are looked at, microseconds.
+/// Time between the rows in which accelerations are measured, microseconds.
 const PERIOD_US: u64 = 1000;
 
-/// Largest speed and acceleration of the belts, mm/s and mm/s²: the box that holds the disc of 100 mm/s and 1000 mm/s².
+/// Largest speed and acceleration of the belts, mm/s and mm/s²: the square around the disc of 100
+/// mm/s and 1000 mm/s².
 const SPEED: f64 = 141.42;
 const ACCELERATION: f64 = 1414.2;
 const TICKS_PER_MM: f64 = 80.0;
 
 const TOPPRA: &str = include_str!("toppra_side.py");
 
-/// A figure that is wanted.
+/// A measured figure with its goal.
 struct Goal {
     what: &'static str,
     unit: &'static str,
@@ -63,7 +64,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
     let stages = Stages::of(&machine, &once)?;
     let ten_stages = Stages::of(&machine, &tenfold)?;
     let emission = emission(&machine, &trajectory)?;
-    // Of a plan that is kept, for one that is not is planned again while it is emitted: so from a tenth to the whole.
+    // Only cached plans: others are planned again during emission. So from a tenth to the whole.
     let tenth = read(&workload::points(POINTS / 10))?;
     let tenth_plan = planner::plan(&machine, tenth, &settings)?;
     let tenth_emission = emission_seconds(&machine, &tenth_plan)?;
@@ -162,7 +163,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
     Ok(goals.iter().all(Goal::met))
 }
 
-/// The workload as the pipeline gets it: written as HPGL and read back.
+/// The workload as the pipeline receives it: written as HPGL and parsed.
 fn read(points: &[Point]) -> Result<Drawing> {
     let document = hpgl::read(workload::hpgl(points).as_bytes(), &hpgl::Options::default());
     anyhow::ensure!(document.diagnostics.is_empty(), "the workload is read with {:?}", document.diagnostics);
@@ -204,7 +205,7 @@ fn corexy() -> Result<Machine> {
     })?)
 }
 
-/// An arm of two links whose motors both stand in its base, for the cost of sines.
+/// An arm with two links and both motors in its base, for the cost of transcendental functions.
 fn arm() -> Result<Machine> {
     let counts = 32_000.0 / std::f64::consts::TAU;
     Ok(Machine::new(MachineParts {
@@ -228,10 +229,10 @@ fn arm() -> Result<Machine> {
 
 /// Largest finite differences over the rows of a plan.
 struct Peaks {
-    /// As shares of the limits, of the exact positions.
+    /// As shares of the limits, in the exact positions.
     speed: f64,
     acceleration: f64,
-    /// Largest second difference of the whole ticks.
+    /// Largest second difference of the ticks.
     ticks: f64,
 }
 
@@ -240,13 +241,13 @@ impl Peaks {
         let period = PERIOD_US as f64 * 1e-6;
         let mut peaks = Self { speed: 0.0, acceleration: 0.0, ticks: 0.0 };
         let mut last: Option<(u64, [f64; 2], [i64; 2])> = None;
-        // Differences to the row before; at rest before the first.
+        // Differences from the previous row; at rest before the first.
         let (mut step, mut tick_step) = ([0.0; 2], [0; 2]);
         for row in trajectory.rows() {
             let (t_us, exact, ticks) = (row.row.t_us, row.exact, row.row.ticks);
             if let Some((before, from, from_ticks)) = last {
                 if t_us - before > PERIOD_US {
-                    // Rows are left out only where nothing moves.
+                    // Rows are omitted only where nothing moves.
                     (step, tick_step) = ([0.0; 2], [0; 2]);
                 }
                 for (k, motor) in machine.motors().iter().enumerate() {
@@ -265,11 +266,11 @@ impl Peaks {
     }
 }
 
-/// The planner's stages one by one, s of CPU.
+/// The planner's stages one by one, s of CPU time.
 struct Stages {
     path: f64,
     lift: f64,
-    /// On the path's own intervals, and refined.
+    /// On the path's own grid, and refined.
     rough_law: f64,
     time_law: f64,
     intervals: usize,
@@ -278,7 +279,7 @@ struct Stages {
     profiles: Vec<Profile>,
 }
 
-/// How many phases profiles have, and how long they are, s.
+/// The number of phases and the total duration of some profiles, s.
 fn nodes_and_time(profiles: &[Profile]) -> (usize, f64) {
     let phases = profiles.iter().map(|profile| profile.phases.len()).sum();
     (phases, profiles.iter().map(|profile| profile.duration_s).sum())
@@ -320,7 +321,7 @@ impl Stages {
     }
 }
 
-/// Rows a second through inverse kinematics, rounding and CSV.
+/// Rows per second through inverse kinematics, rounding and CSV.
 fn emission(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f64> {
     Ok(trajectory.row_count() as f64 / emission_seconds(machine, trajectory)?)
 }
@@ -348,7 +349,7 @@ fn emission_seconds(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f6
     Ok(seconds)
 }
 
-/// toppra over the same points, and over the same path with the same limits.
+/// toppra on the same points, and on the same path with the same limits.
 fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) -> Result<()> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str, text: &str| -> Result<std::path::PathBuf> {
@@ -405,7 +406,7 @@ fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) ->
     Ok(())
 }
 
-/// What the script says; nothing where there is no Python or no toppra.
+/// The script's output; `None` if Python or toppra is missing.
 fn run_python(python: &str, script: &Path, points: &Path, nodes: &Path) -> Result<Option<String>> {
     let Ok(output) = Command::new(python).arg(script).arg(points).arg(nodes).output() else {
         return Ok(None);
@@ -417,7 +418,8 @@ fn run_python(python: &str, script: &Path, points: &Path, nodes: &Path) -> Resul
     Ok(Some(String::from_utf8(output.stdout)?))
 }
 
-/// `s q q' q''` in mm of belt at the start of every stretch of a path, none longer than 0.2 mm, and at its end.
+/// `s q q' q''` in mm of belt at the start of every part of a path, none longer than 0.2 mm, and at
+/// its end.
 fn nodes(machine: &Machine, path: &JointPath) -> String {
     let PathGeometry::Drawn(start, section) = &path.geometry else { return String::new() };
     let (mut text, mut s, mut near) = (String::new(), 0.0, *start);

@@ -1,7 +1,8 @@
-//! The planner's workload: one stroke of circles, zigzags, long lines and roses, without the pen ever being lifted.
+//! The planner's workload: one stroke of circles, zigzags, long lines and roses.
 //!
-//! The points are those that other planners were measured on, so the zigzags' heights come from the same generator of
-//! chance (MT19937, Matsumoto & Nishimura 1998, seeded with 7). 10,000 points are 11,649.942 mm.
+//! The points are those that other planners were measured on, so the heights of the zigzags come
+//! from the same random number generator (MT19937, Matsumoto & Nishimura 1998, seeded with 7). The
+//! polyline of 10,000 points is 11,649.942 mm long.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -48,7 +49,7 @@ pub(super) fn points(count: usize) -> Vec<Point> {
     points
 }
 
-/// The points as one stroke of HPGL; fractions of a plotter unit far below a motor's step.
+/// The points as one stroke of HPGL, with fractions of a plotter unit far below a motor step.
 pub(super) fn hpgl(points: &[Point]) -> String {
     let mut text = String::from("IN;SP1;");
     for (index, point) in points.iter().enumerate() {
@@ -70,7 +71,7 @@ impl MersenneTwister {
     const N: usize = 624;
     const M: usize = 397;
 
-    /// Seeded by the array of one word, the key.
+    /// Initialized by an array of one word, the key.
     fn new(key: u32) -> Self {
         let mut state = [19_650_218_u32; Self::N];
         let mix = |state: &[u32; Self::N], i: usize, factor: u32| {
@@ -115,7 +116,7 @@ impl MersenneTwister {
         word ^ (word >> 18)
     }
 
-    /// From 0 to below 1, of 53 bits.
+    /// A number in [0, 1) with 53 bits.
     fn fraction(&mut self) -> f64 {
         let (high, low) = (self.word() >> 5, self.word() >> 6);
         (f64::from(high) * 67_108_864.0 + f64::from(low)) / 9_007_199_254_740_992.0
@@ -127,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_workload_is_as_long_as_the_one_that_others_were_measured_on() {
+    fn workload_length_matches_reference() {
         let points = points(10_000);
         let length: f64 = points.windows(2).map(|w| (w[1] - w[0]).hypot()).sum();
         assert!((length - 11_649.942).abs() < 0.0005, "{length}");

@@ -1,65 +1,69 @@
-//! Corners as parabolas, or as splines where jerk is limited.
+//! Corner blends: parabolas, or splines where jerk is limited.
 //!
-//! At a corner the direction changes from the unit vector `u` to `v`. A parabola (quadratic Bézier curve) with legs of
-//! the length `l` on both sides of the vertex P joins them tangentially:
+//! At a corner the direction changes from the unit vector `u` to `v`. A parabola (quadratic Bézier
+//! curve) with legs of length `l` on both sides of the vertex P joins them tangentially:
 //!
 //! ```text
-//!  P - l u  ------>  P          p(t) = P + l (-(1-t)² u + t² v),   p'(t) = 2 l ((1-t) u + t v),   p'' = 2 l (v - u)
-//!            \.      |
-//!              '.    |          its point nearest to P is in the middle: distance d = l |v - u| / 4
-//!                 \  v
+//!  P - l u  ------>  P        p(t)  = P + l (-(1-t)² u + t² v)
+//!            \.      |        p'(t) = 2 l ((1-t) u + t v),   p'' = 2 l (v - u)
+//!              '.    |
+//!                 \  v        distance to P, at the midpoint: d = l |v - u| / 4
 //!                   P + l v
 //! ```
-//! With t even in time the acceleration is constant, so where only acceleration is limited a parabola is driven with
-//! the same motor at its limit from end to end: at the end speed c it is `c² |v - u| / (2 l)`, so for a given deviation
-//! `c² = 8 d a / |v - u|²`. A circular arc of the same deviation allows `a d / (1 / cos(theta/2) - 1)`: the same for
-//! small turns, 1.66 times less at a right angle. The vertex is missed by d and the blend strays by less.
-
-//! Where a motor's jerk is limited the curvature must not jump either. There a uniform cubic B-spline of three spans joins the
-//! two sides with their position, direction and curvature. Between lines, with spans of h, it has legs of `1.5 h`:
+//! With t proportional to time the acceleration is constant, so where only acceleration is limited
+//! the same motor is at its limit along the whole parabola: at the end speed c the acceleration is
+//! `c² |v - u| / (2 l)`, so a deviation d allows `c² = 8 d a / |v - u|²`. A circular arc of the
+//! same deviation allows `a d / (1 / cos(theta/2) - 1)`: the same for small angles, 1.66 times less
+//! at a right angle. The distance from the vertex is d; the blend's own deviation is smaller.
+//!
+//! Where a motor's jerk is limited the curvature must be continuous as well. There a uniform cubic
+//! B-spline of three spans matches position, direction and curvature on both sides. Between lines,
+//! with spans of h, it has legs of `1.5 h`:
 //!
 //! ```text
 //! control points  P - 5/2 h u,  P - 3/2 h u,  P - 1/2 h u,  P + 1/2 h v,  P + 3/2 h v,  P + 5/2 h v
-//! nearest to P    d = 13 h |v - u| / 48,   |p''| <= |v - u| / (2 h),   |p'''| = |v - u| / (2 h²)      by a parameter of |p'| = 1
+//! distance to P   d = 13 h |v - u| / 48
+//! where |p'| = 1  |p''| <= |v - u| / (2 h),   |p'''| = |v - u| / (2 h²)
 //! ```
-//! Its legs are 1.4 times those of the parabola that misses the vertex by as much. Also where a line runs smoothly into an arc
-//! the curvature jumps; such junctions become splines too.
+//! Its legs are 1.4 times those of the parabola with the same deviation. The curvature also jumps
+//! where a line meets an arc tangentially; such junctions become splines too.
 
 use drawing::{CubicBez, Point, Segment, Vec2};
 
 use super::tangent::{direction_at, distance, is_smooth};
 
-/// Directions that differ by more than this (cosine) turn back: 175 degrees.
+/// A direction change with a smaller cosine is a reversal: 175 degrees.
 const TURNS_BACK: f64 = -0.9962;
 
-/// Curvatures that differ by less than this share go on.
+/// Relative difference of curvatures below which they count as equal.
 const SAME_CURVATURE: f64 = 1e-9;
 
-/// Blends shorter than this are not worth a piece, mm.
+/// Shortest leg of a blend, mm.
 const SHORTEST: f64 = 1e-6;
 
-/// What becomes of a corner.
+/// The shape of a corner blend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CornerBlend {
-    /// A parabola: the curvature jumps at its ends. The fastest where only acceleration is limited.
+    /// A parabola. The curvature jumps at its ends. The fastest shape where only acceleration is
+    /// limited.
     Parabola,
-    /// A spline of three cubics: the curvature is continuous.
+    /// A spline of three cubics with continuous curvature.
     Spline,
 }
 
-/// The junction after each piece but the last.
+/// The junction after each piece except the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Junction {
-    /// The tangent goes on.
+    /// The tangent is continuous.
     Smooth,
-    /// The pen rests.
+    /// The pen stops.
     Stop,
-    /// A blend with legs of this length.
+    /// A blend with legs of this length, mm.
     Blend(f64),
 }
 
-/// Smooth runs of curves: corners blended within `deviation` mm, cut where the pen turns back (or at every corner if
-/// the deviation is 0).
+/// Smooth sequences of curves: corners are blended within `deviation` mm, and sequences end at
+/// reversals (at every corner if the deviation is 0).
 pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: CornerBlend) -> Vec<Vec<Segment>> {
     if pieces.is_empty() {
         return Vec::new();
@@ -67,7 +71,7 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: CornerBlend) 
     let junctions = junctions(pieces, deviation, corner);
     let mut sections = Vec::new();
     let mut section = Vec::new();
-    // How much of the piece at hand its first blend has taken, mm.
+    // How much of the current piece the blend at its start uses, mm.
     let mut taken = 0.0;
     for (index, piece) in pieces.iter().enumerate() {
         let junction = junctions.get(index).copied().unwrap_or(Junction::Stop);
@@ -87,11 +91,11 @@ pub(super) fn sections(pieces: &[Segment], deviation: f64, corner: CornerBlend) 
     sections
 }
 
-/// Every junction, with legs such that neighbouring blends share the piece between them.
+/// All junctions. The legs are chosen such that neighboring blends share the piece between them.
 fn junctions(pieces: &[Segment], deviation: f64, corner: CornerBlend) -> Vec<Junction> {
     let mut junctions: Vec<Junction> =
         pieces.windows(2).map(|pair| ideal_junction(&pair[0], &pair[1], deviation, corner)).collect();
-    // The piece between two blends: whoever wants less than half of it leaves the rest to the other.
+    // A blend that needs less than half of the piece leaves the rest to the other blend.
     let leg = |junction: Option<&Junction>| match junction {
         Some(Junction::Blend(leg)) => *leg,
         _ => 0.0,
@@ -117,7 +121,7 @@ fn junctions(pieces: &[Segment], deviation: f64, corner: CornerBlend) -> Vec<Jun
     junctions
 }
 
-/// What a junction would be if it had both pieces to itself.
+/// The junction that would be best if both pieces were available completely.
 fn ideal_junction(before: &Segment, after: &Segment, deviation: f64, corner: CornerBlend) -> Junction {
     let (Some(u), Some(v)) = (direction_at(before, 1.0), direction_at(after, 0.0)) else {
         return Junction::Stop;
@@ -136,7 +140,8 @@ fn ideal_junction(before: &Segment, after: &Segment, deviation: f64, corner: Cor
     if matches!((before, after), (Segment::Line(_), Segment::Line(_))) {
         return Junction::Blend(leg);
     }
-    // Between curves the closed form is only where to begin: shorten until what is measured holds.
+    // Between curves the closed form is only an initial value: shorten until the measured deviation
+    // is within the limit.
     let mut leg = leg.min(available(before) / 2.0).min(available(after) / 2.0);
     while leg > SHORTEST {
         if corner
@@ -150,7 +155,8 @@ fn ideal_junction(before: &Segment, after: &Segment, deviation: f64, corner: Cor
     Junction::Stop
 }
 
-/// How much of a piece blends may take, mm: of a curve no more than turns by half a radian.
+/// The length of a piece that blends may use, mm; on a curve at most the length that turns by 0.5
+/// rad.
 fn available(piece: &Segment) -> f64 {
     match piece {
         Segment::Line(line) => distance(line.p0, line.p1),
@@ -164,7 +170,7 @@ fn available(piece: &Segment) -> f64 {
     }
 }
 
-/// The piece without `start` mm at its start and `end` mm at its end; nothing if none of it is left.
+/// The piece without `start` mm at its start and `end` mm at its end; `None` if nothing is left.
 fn trimmed(piece: &Segment, start: f64, end: f64) -> Option<Segment> {
     if start == 0.0 && end == 0.0 {
         return Some(*piece);
@@ -173,18 +179,19 @@ fn trimmed(piece: &Segment, start: f64, end: f64) -> Option<Segment> {
     ((t1 - t0) * available(piece) > SHORTEST).then(|| piece.part(t0, t1))
 }
 
-/// The parameter about `leg` mm from an end: exactly so on lines and circles, by the speed at the end on other curves.
+/// The parameter about `leg` mm from an end: exact on lines and circles, a linear estimate from the
+/// speed at the end on other curves.
 fn parameter(piece: &Segment, leg: f64, at_start: bool) -> f64 {
     let end = if at_start { 0.0 } else { 1.0 };
-    // A line may give more than half of itself to one blend, where the other wants less.
+    // A line may give more than half of itself to one blend if the other needs less.
     let most = if matches!(piece, Segment::Line(_)) { 1.0 } else { 0.5 * (1.0 + 1e-9) };
     let share = (leg / piece.derivatives(end).0.hypot2().sqrt()).min(most);
     if at_start { share } else { 1.0 - share }
 }
 
 impl CornerBlend {
-    /// The blend at the junction of two pieces: from `leg` mm before it to `leg` mm behind it, with the pieces' own tangents.
-    /// Nothing if there is none between.
+    /// The blend at the junction of two pieces, from `leg` mm before it to `leg` mm after it,
+    /// tangent to both; `None` if there is none.
     fn curve(self, before: &Segment, after: &Segment, leg: f64) -> Option<Vec<Segment>> {
         let (t0, t1) = (parameter(before, leg, false), parameter(after, leg, true));
         match self {
@@ -197,7 +204,7 @@ impl CornerBlend {
 fn parabola(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Option<Segment> {
     let (start, end) = (before.eval(t0), after.eval(t1));
     let (u, v) = (direction_at(before, t0)?, direction_at(after, t1)?);
-    // start + x u = end - y v
+    // Solve start + x u = end - y v.
     let (across, turn) = (end - start, u.cross(v));
     let (x, y) = (across.cross(v) / turn, u.cross(across) / turn);
     let fair = |length: f64| length > 0.2 * leg && length < 5.0 * leg;
@@ -205,13 +212,13 @@ fn parabola(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Op
         return None;
     }
     let vertex = start + x * u;
-    // A quadratic Bézier curve as a cubic.
+    // Degree elevation: a quadratic Bézier curve as a cubic.
     let third = |p: Point| p + (2.0 / 3.0) * (vertex - p);
     Some(Segment::Cubic(CubicBez::new(start, third(start), third(end), end)))
 }
 
-/// The spline whose control points give position p, direction and curvature at both ends: from `p = (c0 + 4 c1 + c2) / 6`,
-/// `h p' = (c2 - c0) / 2` and `h² p'' = c0 - 2 c1 + c2`.
+/// The spline whose control points match position p, direction and curvature at both ends, from `p
+/// = (c0 + 4 c1 + c2) / 6`, `h p' = (c2 - c0) / 2` and `h² p'' = c0 - 2 c1 + c2`.
 fn spline(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Option<Vec<Segment>> {
     let h = leg / 1.5;
     let (u, v) = (direction_at(before, t0)?, direction_at(after, t1)?);
@@ -228,7 +235,7 @@ fn spline(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Opti
         Segment::Cubic(curve)
     };
     let spans = [[c0, c1, c2, c3], [c1, c2, c3, c4], [c2, c3, c4, c5]].map(span);
-    // Two ends that are turned too far against each other would make a loop.
+    // If the end directions differ too much the spline would form a loop.
     let forward = |segment: &Segment| {
         let (first, _) = segment.derivatives(0.5);
         first.dot(u + v) > 0.0
@@ -236,20 +243,21 @@ fn spline(before: &Segment, t0: f64, after: &Segment, t1: f64, leg: f64) -> Opti
     spans.iter().all(forward).then(|| spans.to_vec())
 }
 
-/// The second derivative by a parameter of which the pen's speed is 1 there, 1/mm: where the parameter is the length, the
-/// curvature towards its centre.
+/// The second derivative with respect to a parameter in which the pen's speed is 1, 1/mm: the
+/// curvature vector where that parameter is arc length.
 fn curvature_at(piece: &Segment, t: f64) -> Vec2 {
     let (first, second) = piece.derivatives(t);
     second / first.hypot2()
 }
 
-/// Whether the curvature goes on at a smooth junction.
+/// Whether the curvature is continuous at a smooth junction.
 fn is_as_curved(before: &Segment, after: &Segment) -> bool {
     let (one, other) = (curvature_at(before, 1.0), curvature_at(after, 0.0));
     (one - other).hypot2().sqrt() <= SAME_CURVATURE * (one.hypot2().sqrt() + other.hypot2().sqrt())
 }
 
-/// How far a blend strays from the two pieces, or misses their junction, mm, by samples; a bound to a few per cent.
+/// The deviation between a blend and the two pieces, in both directions, mm. Sampled; the factor
+/// 1.02 covers the sampling error.
 fn strays(blend: &[Segment], before: &Segment, after: &Segment, leg: f64) -> f64 {
     const SAMPLES: u32 = 16;
     let along = |segment: &Segment, from: f64, to: f64| -> Vec<Point> {
@@ -285,7 +293,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn blends_stay_within_the_deviation_both_ways_and_are_smooth(
+        fn blend_deviation_and_smoothness(
             turns in proptest::collection::vec((-3.0..3.0f64, 0.02..5.0f64), 2..12), deviation in 0.01..0.5f64,
             corner in prop_oneof![Just(CornerBlend::Parabola), Just(CornerBlend::Spline)],
         ) {
@@ -322,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_meets_a_circle_at_an_angle_is_blended() {
+    fn line_to_circle_corner_is_blended() {
         let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(10.0, 0.0)));
         let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, -1.0, 2.0));
         let Segment::Arc(at) = arc else { unreachable!("it is an arc") };
@@ -336,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_right_angle_uses_all_of_its_deviation() {
+    fn parabola_uses_full_deviation() {
         let corner = [Point::new(0.0, 0.0), Point::new(10.0, 0.0), Point::new(10.0, 10.0)];
         let lines: Vec<Segment> = corner.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
         let sections = sections(&lines, 0.1, CornerBlend::Parabola);
@@ -346,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_uses_all_of_its_deviation_too() {
+    fn spline_uses_full_deviation() {
         let corner = [Point::new(0.0, 0.0), Point::new(10.0, 0.0), Point::new(10.0, 10.0)];
         let lines: Vec<Segment> = corner.windows(2).map(|w| Segment::Line(Line::new(w[0], w[1]))).collect();
         let sections = sections(&lines, 0.1, CornerBlend::Spline);
@@ -356,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_runs_into_a_circle_gets_a_transition() {
+    fn tangent_line_to_circle_gets_spline() {
         let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(10.0, 0.0)));
         let down = -std::f64::consts::FRAC_PI_2;
         let arc = Segment::Arc(EllipticArc::circular(Point::new(10.0, 5.0), 5.0, down, 2.0));

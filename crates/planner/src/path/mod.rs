@@ -1,10 +1,12 @@
-//! From a stroke to smooth sections: what the pen can follow without stopping.
+//! From a stroke to smooth sections, which the pen can follow without stopping. Units are machine
+//! mm.
 //!
 //! ```text
-//! Stroke --clean--> pieces --simplify--> fewer straight pieces --blend--> sections with a continuous tangent
+//! Stroke --clean--> pieces --simplify--> fewer lines --blend--> sections with a continuous tangent
 //! ```
-//! Pieces of no length go, straight pieces in line are joined, vertices that say nothing at this tolerance go, corners
-//! become parabolas inside the tolerance; where the pen turns back it rests. All of it in machine mm.
+//! Zero-length pieces are removed, collinear lines are merged, vertices that are redundant within
+//! the tolerance are removed, and corners are blended within the tolerance. The pen stops at
+//! reversals.
 
 mod blend;
 mod piece;
@@ -18,30 +20,30 @@ pub use blend::CornerBlend;
 pub use piece::{Piece, Section};
 use tangent::{direction_at, velocity};
 
-/// Vertices that lie on the straight line between their neighbours, to this distance in mm, are not corners.
+/// Distance below which a vertex counts as collinear with its neighbors, mm.
 const COLLINEAR: f64 = 1e-9;
 
-/// A curve whose speed |p'(t)| somewhere falls below this share of its largest is taken as chords: at a cusp its
-/// direction has no derivative by length.
+/// A curve whose speed |p'(t)| falls below this share of its maximum is replaced by chords: at a
+/// cusp the direction is not differentiable with respect to arc length.
 const REGULAR: f64 = 1e-3;
 
-/// How far the planned path may be from the drawing, mm, by what makes it so.
+/// How far the planned path may deviate from the drawing, by cause.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathBudget {
-    /// Chords that stand for curves with a cusp.
+    /// Chords that replace curves with a cusp.
     pub chord_mm: f64,
-    /// Straight pieces that stand for several.
+    /// Lines that replace several lines.
     pub simplify_mm: f64,
-    /// Blends that stand for corners.
+    /// Blends that replace corners.
     pub blend_mm: f64,
-    /// What becomes of corners.
+    /// The shape of blends.
     pub corner: CornerBlend,
-    /// What linear motion between rows may take, where the motors are strong enough to exceed it: then pieces near turns
-    /// are marked. Infinite where they are not.
+    /// Linear motion between rows, if the motors are strong enough to exceed it: pieces near
+    /// corners are then marked. Otherwise infinite.
     pub row_mm: f64,
 }
 
-/// The smooth sections of a stroke, in order; none for a dot or a stroke that goes nowhere.
+/// The smooth sections of a stroke, in order; empty for a dot or a stroke of length 0.
 pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
     let pieces = clean(stroke, budget.chord_mm);
     let pieces =
@@ -56,12 +58,14 @@ pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
         .collect()
 }
 
-/// Every piece of a stroke as a section of its own: the pen rests at all vertices but those that lie on a straight line.
+/// Every piece of a stroke as a section of its own: the pen stops at every vertex, except between
+/// collinear lines.
 pub(crate) fn vertex_to_vertex(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
     clean(stroke, budget.chord_mm).into_iter().map(|curve| parametrise(vec![curve])).collect()
 }
 
-/// The stroke's pieces without those of no length, straight ones in line joined, cusped curves as chords.
+/// The stroke's pieces without those of length 0; collinear lines are merged and curves with a cusp
+/// are replaced by chords.
 fn clean(stroke: &Stroke, chord_tolerance: f64) -> Vec<Segment> {
     let mut pieces: Vec<Segment> = Vec::with_capacity(stroke.segment_count());
     let mut add = |piece: Segment| {
@@ -90,7 +94,7 @@ fn clean(stroke: &Stroke, chord_tolerance: f64) -> Vec<Segment> {
     pieces
 }
 
-/// Gives every piece its rate.
+/// Sets the rate of every piece.
 fn parametrise(curves: Vec<Segment>) -> Section {
     let mut speed = 1.0;
     let piece = |curve: Segment| {
@@ -102,7 +106,8 @@ fn parametrise(curves: Vec<Segment>) -> Section {
     curves.into_iter().map(piece).collect()
 }
 
-/// Whether `next` goes on in the direction of `before`: the vertex between lies on the chord, and neither turns back.
+/// Whether `next` continues `before`: the vertex between them lies on their chord, and neither line
+/// reverses.
 fn in_line(before: &Line, next: &Line) -> bool {
     let (chord, first) = (next.p1 - before.p0, before.p1 - before.p0);
     let second = next.p1 - next.p0;
@@ -111,7 +116,8 @@ fn in_line(before: &Line, next: &Line) -> bool {
         && first.cross(chord).abs() <= COLLINEAR * chord.hypot2().sqrt()
 }
 
-/// Whether the speed along the curve stays well above zero, sampled finely enough for arcs and cubics.
+/// Whether the speed along the curve stays well above zero, sampled finely enough for arcs and
+/// cubics.
 fn is_regular(segment: &Segment) -> bool {
     let samples = match segment {
         Segment::Line(_) => return true,
@@ -143,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn collinear_and_repeated_vertices_are_not_corners() {
+    fn collinear_and_repeated_vertices_are_merged() {
         let stroke = polyline(&[(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (5.0, 0.0), (5.0, 3.0)]);
         let sections = sections(&stroke, &EXACT);
         assert_eq!(sections.len(), 2);
@@ -152,13 +158,13 @@ mod tests {
     }
 
     #[test]
-    fn a_reversal_is_a_stop_even_where_corners_are_blended() {
+    fn reversal_is_stop_with_blends() {
         let budget = PathBudget { blend_mm: 0.1, ..EXACT };
         assert_eq!(sections(&polyline(&[(0.0, 0.0), (5.0, 0.0), (2.0, 0.0)]), &budget).len(), 2);
     }
 
     #[test]
-    fn a_tangent_arc_goes_on_in_the_same_section() {
+    fn tangent_arc_continues_section() {
         let mut stroke = polyline(&[(0.0, 0.0), (5.0, 0.0)]);
         let down = -std::f64::consts::FRAC_PI_2;
         stroke.arc(EllipticArc::circular(Point::new(5.0, 2.0), 2.0, down, 1.0));
@@ -166,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_ellipse_turns_back_at_its_ends() {
+    fn flat_ellipse_reverses_at_ends() {
         let mut stroke = Stroke::new(Pen(1), Point::new(4.0, 0.0), Span::default());
         stroke.arc(EllipticArc {
             center: Point::ZERO,
@@ -181,18 +187,18 @@ mod tests {
     }
 
     #[test]
-    fn a_dot_has_no_sections() {
+    fn dot_has_no_sections() {
         assert!(sections(&polyline(&[(1.0, 1.0)]), &EXACT).is_empty());
         assert!(sections(&polyline(&[(1.0, 1.0), (1.0, 1.0)]), &EXACT).is_empty());
     }
 
     #[test]
-    fn a_chord_of_a_circle_runs_like_the_circle() {
+    fn chords_of_circle_form_one_section() {
         let points: Vec<(f64, f64)> =
             (0..=60).map(|k| libm::sincos(f64::from(k) * 0.05)).map(|(s, c)| (20.0 * c, 20.0 * s)).collect();
         let sections = sections(&polyline(&points), &PathBudget { blend_mm: 0.05, ..EXACT });
         assert_eq!(sections.len(), 1);
-        // Neighbouring blends share their segments whole: nothing but the very ends stays straight.
+        // Neighboring blends divide their segments completely: only the two ends remain straight.
         let straight: f64 = sections[0]
             .iter()
             .filter(|piece| matches!(piece.curve, Segment::Line(_)))

@@ -1,16 +1,19 @@
-//! Fewer straight pieces within a tolerance: vertices that only say where the producer's grid is are no corners.
+//! Polyline simplification within a tolerance: many vertices only reflect the grid of the program
+//! that made the file.
 
 use drawing::{Line, Point, Segment};
 
 use super::tangent::distance;
 
-/// Straight runs with fewer pieces, such that every point of either is within `tolerance` mm of the other.
+/// Replaces sequences of lines by fewer lines, such that every point of either polyline is within
+/// `tolerance` mm of the other.
 ///
-/// From each kept vertex on, a run of vertices is replaced by the chord to its last for as long as all of them lie
-/// within the tolerance of that chord and each step goes forward along it. Then the perpendicular through any point of
-/// the chord meets the run within the tolerance too, so the bound holds both ways. The set of directions from the kept
-/// vertex in which all vertices so far are near enough is an interval (the intersection of the cones that touch each
-/// vertex's disc), which makes it one pass. Method: Reumann & Witkam 1974, Imai & Iri 1988 for the cone.
+/// From each kept vertex a chord is extended over the following vertices as long as all of them lie
+/// within the tolerance of the chord and each step advances along it. Then the normal through any
+/// point of the chord also meets the polyline within the tolerance, so the bound holds in both
+/// directions. The directions from the kept vertex that satisfy the tolerance form an interval, the
+/// intersection of the cones that touch the disc around each vertex, so one pass is sufficient.
+/// Method: Reumann & Witkam 1974; Imai & Iri 1988 for the cone.
 pub(super) fn simplify(pieces: Vec<Segment>, tolerance: f64) -> Vec<Segment> {
     let mut simplified = Vec::with_capacity(pieces.len());
     let mut run: Vec<Point> = Vec::new();
@@ -42,10 +45,10 @@ fn flush(run: &mut Vec<Point>, tolerance: f64, to: &mut Vec<Segment>) {
     run.clear();
 }
 
-/// The last vertex to which a chord from `from` may go.
+/// The last vertex that a chord from `from` can reach.
 fn farthest(run: &[Point], from: usize, tolerance: f64) -> usize {
     let anchor = run[from];
-    // Angles relative to the direction of the first step, so that they do not wrap.
+    // Angles are relative to the direction of the first step, which avoids wrapping.
     let first = run[from + 1] - anchor;
     let (mut low, mut high) = (-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2);
     let mut end = from + 1;
@@ -63,11 +66,12 @@ fn farthest(run: &[Point], from: usize, tolerance: f64) -> usize {
     for next in from + 2..run.len() {
         let to = run[next] - anchor;
         let angle = libm::atan2(first.cross(to), first.dot(to));
-        // The chord to `next` must pass all discs so far.
+        // The chord to `next` must pass through all previous discs.
         if !(angle >= low && angle <= high) {
             break;
         }
-        // And every step so far must go forward along it: it is enough to look at the last, and at the cone.
+        // Every step must advance along the chord: checking the last one is sufficient, given the
+        // cone.
         let step = run[next] - run[next - 1];
         if step.dot(to) <= 0.0 || distance(run[next], anchor) <= distance(run[next - 1], anchor) {
             break;
@@ -103,7 +107,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn neither_line_leaves_the_other_by_more_than_the_tolerance(
+        fn simplified_polyline_within_tolerance(
             turns in proptest::collection::vec((-0.9..0.9f64, 0.01..0.5f64), 2..60), tolerance in 0.005..0.2f64,
         ) {
             let (mut at, mut angle) = (Point::ZERO, 0.0);
@@ -111,7 +115,7 @@ mod tests {
             for (turn, step) in turns {
                 angle += turn;
                 at += step * drawing::Vec2::new(libm::cos(angle), libm::sin(angle));
-                // The grid of a plotter's unit.
+                // Round to plotter units.
                 at = Point::new((at.x * 40.0).round() / 40.0, (at.y * 40.0).round() / 40.0);
                 if points.last() != Some(&at) {
                     points.push(at);

@@ -1,19 +1,22 @@
-//! Where the pen must not speed up or slow down hard because a turn is near.
+//! Slow zones: pieces on which the pen's acceleration is limited because a corner is near.
 //!
-//! Between rows, a period `T` apart, motors move linearly, so a row may leave the path by `T²/8` times the largest
-//! acceleration of the pen in between. On a straight line that is no deviation: the pen only runs ahead or behind. Near
-//! a turn it is, also on the straight way into it: a row on the line and the next behind the turn cut the corner.
+//! Motors move linearly between rows, which are a period `T` apart, so the motion may deviate from
+//! the path by `T²/8` times the largest acceleration of the pen in between. On a straight line this
+//! is no deviation: the pen only leads or lags. Near a corner it is, also on the line that leads
+//! into it: linear motion between a row before the corner and one after it cuts the corner.
 
 use drawing::Segment;
 
 use super::piece::{Piece, Section};
 
-/// Marks every piece that lies on a turn or so near to one that a row on it may end in the turn, cutting straight
-/// pieces where they leave that zone.
+/// Marks every piece that lies in a corner, or so near to one that the next row may lie in the
+/// corner. Lines are split at the boundary of that zone.
 ///
-/// On the zone the pen's acceleration will be kept below `A = 8 row / T²`, so rows deviate by `row` mm at the most. A
-/// turn with the second derivative p'' is run at no more than `c = sqrt(A / |p''|)`; from there, with no more than `A`,
-/// the pen covers at most `c T + A T²/2 = sqrt(8 row / |p''|) + 4 row` in a period: so wide is the zone on each side.
+/// In the zone the pen's acceleration is limited to `A = 8 row / T²`, so rows deviate by at most
+/// `row` mm. A corner with the second derivative p'' is passed at no more than `c = sqrt(A /
+/// |p''|)`; starting from that speed, with an acceleration of at most `A`, the pen covers at most
+/// `c T + A T²/2 = sqrt(8 row / |p''|) + 4 row` in a period, which is the width of the zone on each
+/// side.
 pub(super) fn mark(section: Section, row: f64) -> Section {
     let mut zones: Vec<(f64, f64)> = Vec::new();
     let mut s = 0.0;
@@ -41,7 +44,7 @@ pub(super) fn mark(section: Section, row: f64) -> Section {
                 Some(zone) => (zone.0.min(end), false),
                 None => (end, false),
             };
-            // Slivers are not worth a piece.
+            // Do not create pieces shorter than 1e-6 mm.
             let to = if end - to < 1e-6 { end } else { to };
             marked.push(part(&piece, (from - s) * piece.rate, (to - s) * piece.rate, near_corner));
             from = to;
@@ -51,20 +54,21 @@ pub(super) fn mark(section: Section, row: f64) -> Section {
     marked
 }
 
-/// |p''| where a piece is not straight.
+/// p''| of a piece that is not a line.
 fn second_derivative(piece: &Piece) -> Option<f64> {
     if matches!(piece.curve, Segment::Line(_)) {
         return None;
     }
     let (_, start) = piece.curve.derivatives(0.0);
     let (_, end) = piece.curve.derivatives(1.0);
-    // Where the curvature rises from nothing, as on a spline, the pen is slowed down by what comes next.
+    // Where the curvature starts from 0, as on a spline, the constraint comes from the following
+    // spans.
     let (least, most) = (start.hypot2().min(end.hypot2()).sqrt(), start.hypot2().max(end.hypot2()).sqrt());
     let second = piece.rate * piece.rate * least.max(0.25 * most);
     Some(second.max(1e-6))
 }
 
-/// A part of a piece, from t0 to t1 of its curve's own parameter.
+/// The part of a piece between t0 and t1 in the curve's own parameter.
 fn part(piece: &Piece, t0: f64, t1: f64, near_corner: bool) -> Piece {
     if t0 <= 0.0 && t1 >= 1.0 {
         return Piece { near_corner, ..*piece };
@@ -79,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_line_is_marked_only_near_the_turn() {
+    fn long_line_is_marked_near_corner_only() {
         let line = |a: (f64, f64), b: (f64, f64)| Segment::Line(Line::new(Point::from(a), Point::from(b)));
         let blend = CubicBez::new(
             Point::new(9.7, 0.0),

@@ -2,14 +2,15 @@
 
 use drawing::{Point, Segment, Vec2};
 
-/// The largest break of direction that is not a corner, rad: at 1 m/s it asks for a jump of 1 um/s.
+/// The largest change of direction that is not a corner, rad: at 1 m/s the velocity jumps by 1
+/// um/s.
 const SMOOTH_ANGLE: f64 = 1e-6;
 
 pub(super) fn velocity(curve: &Segment, t: f64) -> f64 {
     curve.derivatives(t).0.hypot2().sqrt()
 }
 
-/// The unit tangent at an end; nothing for a piece of no length.
+/// The unit tangent; `None` where the speed is 0.
 pub(super) fn direction_at(piece: &Segment, t: f64) -> Option<Vec2> {
     let (first, _) = piece.derivatives(t);
     let speed = first.hypot2().sqrt();

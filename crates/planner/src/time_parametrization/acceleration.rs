@@ -1,13 +1,15 @@
-//! Speed under motor speeds and accelerations: reachable sets, intervals cut finer where that gains time.
+//! Time parametrization under speed and acceleration limits: controllable sets on an adaptive grid.
 //!
-//! Reachable-set method (Pham & Pham 2018, arXiv 1707.07239). Since (0, 0) is allowed everywhere and all conditions are
-//! convex, the set of b from which the end can be reached is an interval [0, top] at every node. Backward sweep: `top`
-//! at a node is the largest b for which some u fulfils the interval's conditions and leads into [0, top of the next node].
-//! Forward sweep: the largest u at each node. Cost linear in the number of intervals.
+//! Reachability analysis, TOPP-RA (Pham & Pham 2018, arXiv 1707.07239). Since (0, 0) is always
+//! feasible and all constraints are convex, the set of b from which the end can be reached is an
+//! interval [0, top] at every grid point. Backward pass: `top` is the largest b for which some u
+//! satisfies the interval's constraints and leads into [0, top of the next point]. Forward pass:
+//! the largest u at each point. The cost is linear in the number of intervals.
 //!
-//! With one acceleration a interval, no motor stays at its limit throughout a interval on which its derivatives change. Where
-//! motors idle for that reason, intervals are cut in two and the law is laid anew, a window of intervals at a time, until what
-//! idling costs is below a share of the time that nobody will see.
+//! With one acceleration per interval, no motor stays at its limit over an interval on which its
+//! derivatives change. Where motors are below their limits for that reason, intervals are bisected
+//! and both passes are repeated, on a window of intervals at a time, until the estimated loss is
+//! negligible.
 
 use kinematics::Machine;
 
@@ -15,23 +17,24 @@ use super::constraints::IntervalConstraints;
 use super::profile::{Profile, SpeedCap};
 use crate::joint_path::{GridInterval, JointPath, PathGeometry};
 
-/// How many of the path's own intervals are refined together: memory and cost follow it, and its ends are interval to the
-/// speeds of the coarse law.
+/// Number of the path's intervals that are refined together. Memory and cost are proportional to
+/// it; the speeds at its ends are those of the coarse solution.
 const WINDOW: usize = 256;
 
-/// Cells are refined until idle motors cost no more than this share of the time...
+/// Refinement ends when unused capacity costs no more than this share of the duration,
 const UNUSED_COST: f64 = 4e-4;
 
-/// ... or until cutting them in two brings no more than this share.
+/// or when a round of bisections gains no more than this share.
 const LEAST_GAIN: f64 = 1e-4;
 
-/// A interval is not cut if its motors idle by less than this share of their limits.
+/// An interval is not bisected if its unused capacity is below this share of the limits.
 const UNUSED: f64 = 2e-3;
 
-/// Cells that take less than this share of the time between rows are not cut: nobody would see where in it motors idle.
+/// Intervals that take less than this share of the time between rows are not bisected: the effect
+/// is invisible in the rows.
 const SHORTEST: f64 = 1.0 / 16.0;
 
-/// How often intervals are cut in two.
+/// Largest number of refinement rounds.
 const ROUNDS: usize = 8;
 
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
@@ -53,7 +56,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     profile.slowed(slower)
 }
 
-/// With no more intervals than the path has, but for such as begin and end at rest.
+/// On the path's own grid. Only intervals that begin and end at rest are divided.
 #[cfg(feature = "unstable")]
 pub(super) fn profile_without_refinement(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     let mut profile = Profile::new();
@@ -62,25 +65,25 @@ pub(super) fn profile_without_refinement(machine: &Machine, path: &JointPath, ca
     profile.slowed(grid.limit_excess(machine).sqrt())
 }
 
-/// A interval with its conditions.
+/// An interval with its constraints.
 #[derive(Clone)]
 struct ConstrainedInterval {
     interval: GridInterval,
     constraints: IntervalConstraints,
 }
 
-/// The fastest way over some intervals.
+/// The fastest motion over a sequence of intervals.
 #[derive(Default)]
 struct Grid {
     intervals: Vec<ConstrainedInterval>,
-    /// The intervals' order along the path, as indices.
+    /// The order of the intervals along the path, as indices.
     order: Vec<usize>,
-    /// b at every node.
+    /// b at every grid point.
     nodes: Vec<f64>,
 }
 
 impl Grid {
-    /// Over all of a path, from rest to rest.
+    /// Over a whole path, from rest to rest.
     fn of(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Self {
         let hold = |interval: &GridInterval| ConstrainedInterval {
             constraints: IntervalConstraints::new(machine, interval, cap),
@@ -91,8 +94,8 @@ impl Grid {
         grid
     }
 
-    /// Finds b at every node of all intervals in a row: from `start`, or the largest b from which there is a way if that is
-    /// less, to at most `end`.
+    /// Computes b at every grid point for all intervals in sequence: from `start`, or the largest
+    /// feasible b if that is less, to at most `end`.
     fn sweep(&mut self, start: f64, end: f64) {
         self.order.clear();
         self.order.extend(0..self.intervals.len());
@@ -109,8 +112,8 @@ impl Grid {
         self.solved_intervals().map(|(interval, from, to)| interval.constraints.time(from, to)).sum()
     }
 
-    /// The node at which a window that is to end at `wanted` should: where the law is nearest to the largest speed, or on
-    /// a straight way, so that nothing is lost by keeping to the coarse law there.
+    /// The grid point near `wanted` at which to end a window: where the speed is closest to its
+    /// cap, or on a line, so that keeping the coarse solution's speed there costs nothing.
     fn window_end(&self, wanted: usize) -> usize {
         if wanted + WINDOW / 4 >= self.intervals.len() {
             return self.intervals.len();
@@ -127,7 +130,7 @@ impl Grid {
         best.0
     }
 
-    /// Cuts the intervals as often as it pays.
+    /// Bisects intervals while that gains enough.
     fn refine(&mut self, machine: &Machine, geometry: &PathGeometry, cap: &SpeedCap) {
         let (start, end) = (self.nodes[0], self.nodes[self.order.len()]);
         let mut time = self.time();
@@ -150,7 +153,8 @@ impl Grid {
                 }
             }
             sweeps(&self.intervals, &order, start, end, &mut nodes);
-            // The finer intervals' conditions are interval in more places, so in rare cases the speed given is too high for them.
+            // The constraints of the finer intervals hold at more points, so in rare cases the
+            // given start speed is infeasible for them.
             if order.len() == self.order.len() || nodes[0] < start {
                 break;
             }
@@ -163,8 +167,8 @@ impl Grid {
         }
     }
 
-    /// How often each interval that takes longer than `shortest` is to be cut in two because its motors idle; nothing if that
-    /// costs next to no `time`.
+    /// How often to bisect each interval that takes longer than `shortest`; `None` if the loss is
+    /// negligible.
     fn subdivisions(&self, time: f64, shortest: f64) -> Option<Vec<u32>> {
         let mut subdivisions = Vec::with_capacity(self.order.len());
         let (mut cost, mut near_zero_inertia) = (0.0, false);
@@ -174,13 +178,13 @@ impl Grid {
                 subdivisions.push(0);
                 continue;
             }
-            // What the limits were lowered by for want of samples counts as idle too.
+            // Limits lowered by the interpolation error count as unused capacity too.
             let unused_capacity = constraints.unused_capacity(from, to) + interval.interpolation_error;
-            // A motion with limits lower by a share takes longer by half of it.
+            // Lowering all limits by a small share lengthens the motion by half of that share.
             cost += 0.5 * unused_capacity * own_time;
             let is_near = constraints.is_near_zero_inertia_point(from, to);
             near_zero_inertia |= is_near;
-            // Half the length, half the unused_capacity.
+            // Half the length, half the unused capacity.
             let thresholds = [UNUSED, 3.0 * UNUSED, 6.0 * UNUSED];
             let count = thresholds.iter().filter(|threshold| unused_capacity > **threshold).count() as u32;
             subdivisions.push(count.max(u32::from(is_near)));
@@ -188,10 +192,12 @@ impl Grid {
         (!time.is_finite() || near_zero_inertia || cost > UNUSED_COST * time).then_some(subdivisions)
     }
 
-    /// How many times its limit a motor's acceleration may be between the places where it was interval to it, at least 1.
+    /// The largest ratio of a motor's acceleration to its limit between the points where the limit
+    /// was enforced, at least 1.
     ///
-    /// With m'' and b linear between them, `m' u + m'' b` is a parabola: its distance from a straight line is largest half
-    /// way. That is a few millionths as a rule; the motion is made slower by as much.
+    /// With m'' and b linear between them, `m' u + m'' b` is a parabola, whose deviation from a
+    /// line is largest in the middle. The excess is typically some millionths; the motion is slowed
+    /// down to compensate.
     fn limit_excess(&self, machine: &Machine) -> f64 {
         let mut excess = 1.0_f64;
         for (ConstrainedInterval { interval, .. }, from, to) in self.solved_intervals() {
@@ -218,7 +224,8 @@ impl Grid {
     }
 }
 
-/// b at every node: backward from where the end can still be reached, forward as fast as that allows.
+/// b at every grid point: a backward pass for the controllable sets, a forward pass for the largest
+/// speeds in them.
 fn sweeps(intervals: &[ConstrainedInterval], order: &[usize], start: f64, end: f64, nodes: &mut Vec<f64>) {
     nodes.clear();
     nodes.resize(order.len() + 1, end);

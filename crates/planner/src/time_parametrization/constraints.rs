@@ -1,4 +1,4 @@
-//! What a interval allows, and the programs in two variables that the sweeps solve on it.
+//! The constraints of a grid interval, and the two-variable programs that the passes solve on it.
 //!
 //! With `b = (ds/dt)²` and `u = d²s/dt²`, so `db/ds = 2 u`, a motor with position m(s) has
 //!
@@ -6,41 +6,44 @@
 //! speed         |m'| sqrt(b)     <= v      so  b <= (v / |m'|)²
 //! acceleration  |m' u + m'' b|   <= a      linear in (u, b)
 //! ```
-//! On a interval `u` is constant, so b is linear in s. The conditions are held at the interval's start, middle and end; by what m' and
-//! m'' may leave straight lines between those (the interval's [`GridInterval::interpolation_error`]) the limits are lowered. With `b(f) = b + 2 f length u` at the share f of the interval that is
-//! `|P u + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the plane of (u, b), and
-//! two more near turns, where rows would cut them (see `path::slow_zones`).
+//! `u` is constant on an interval, so b is linear in s. The constraints are enforced at the
+//! interval's start, middle and end, with limits lowered by [`GridInterval::interpolation_error`].
+//! With `b(f) = b + 2 f length u` at the fraction f of the interval an acceleration limit is `|P u
+//! + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the
+//! plane of (u, b), and two more near corners for the deviation of linear motion between rows (see
+//! `path::slow_zones`).
 //!
-//! The programs in (u, b) are solved in closed form by comparing every lower bound of u with every upper one.
+//! The programs in (u, b) are solved in closed form by comparing every lower bound of u with every
+//! upper bound.
 
 use kinematics::Machine;
 
 use super::profile::{LimitingConstraints, Phase, Profile, SpeedCap};
 use crate::joint_path::GridInterval;
 
-/// The condition `|p u + r b| <= 1`, p >= 0, with b at the interval's start.
+/// The constraint `|p u + r b| <= 1`, p >= 0, with b at the interval's start.
 #[derive(Clone, Copy, Debug, Default)]
 struct Strip {
     p: f64,
     r: f64,
 }
 
-/// A interval's conditions.
+/// The constraints of an interval.
 #[derive(Clone, Debug)]
 pub(super) struct IntervalConstraints {
-    /// Three of each motor, at the interval's start, middle and end, and two near turns.
+    /// Three per motor, at the interval's start, middle and end, and two near corners.
     strips: [Strip; 8],
     /// Twice the interval's length: b at its end is `b + two_h * u`.
     two_h: f64,
-    /// The largest b anywhere on it by speed.
+    /// The largest b on the interval under the speed limits.
     pub(super) cap: f64,
-    /// The largest b at its start for which some u fulfils the conditions, wherever that leads.
+    /// The largest b at its start for which some u satisfies the constraints, wherever it leads.
     top: f64,
-    /// Whose speed `cap` is.
+    /// The speed limit that determines `cap`.
     capped_by: SpeedLimit,
 }
 
-/// What caps the speed.
+/// Kinds of speed limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SpeedLimit {
     Pen,
@@ -48,12 +51,13 @@ enum SpeedLimit {
     Motor(usize),
 }
 
-/// How a interval is run through.
+/// How the speed changes over an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SpeedShape {
-    /// With one acceleration.
+    /// One acceleration.
     Ramp,
-    /// Up to this b over a length, along at it, and down again over another length.
+    /// Acceleration to this b over the length `up`, constant speed, deceleration over the length
+    /// `down`.
     Peak { b: f64, up: f64, down: f64 },
 }
 
@@ -82,7 +86,8 @@ impl IntervalConstraints {
             lower(speed * speed, SpeedLimit::Motor(k));
         }
         if interval.near_corner {
-            // |p'| |u| + second_derivative_bound b <= 8 row / T², b largest at either end: two strips that hold at the start, and `cap`.
+            // p'| |u| + bound b <= 8 row / T², with b largest at either end: two strips for the
+            // start, and `cap`.
             let (p, r) = (interval.pen_speed / rows, interval.second_derivative_bound / rows);
             strips[6] = Strip { p, r };
             strips[7] = Strip { p, r: -r };
@@ -93,9 +98,10 @@ impl IntervalConstraints {
         Self { strips, two_h, cap: largest, top, capped_by }
     }
 
-    /// The largest b at the start for which some u fulfils all conditions and leads into [0, next].
+    /// The largest b at the start for which some u satisfies all constraints and leads into [0,
+    /// next].
     pub(super) fn largest_start(&self, next: f64) -> f64 {
-        // (-1 - r b) / p <= (next - b) / two_h: the end is not too fast.
+        // (-1 - r b) / p <= (next - b) / two_h: the speed at the end is not too large.
         let most = |strip: &Strip| {
             let slope = strip.p - self.two_h * strip.r;
             if slope > 0.0 { (strip.p * next + self.two_h) / slope } else { f64::INFINITY }
@@ -103,7 +109,7 @@ impl IntervalConstraints {
         self.strips.iter().map(most).fold(self.top, f64::min)
     }
 
-    /// The largest b at the end, at most `top`, that can be reached from b at the start.
+    /// The largest b at the end, at most `top`, that is reachable from b at the start.
     pub(super) fn largest_end(&self, b: f64, top: f64) -> f64 {
         let highest =
             |strip: &Strip| if strip.p > 0.0 { (1.0 - strip.r * b) / strip.p } else { f64::INFINITY };
@@ -111,8 +117,8 @@ impl IntervalConstraints {
         (b + self.two_h * u).clamp(0.0, top)
     }
 
-    /// By how much the motors stay below their limits over the interval with an even acceleration, as a share of them; 0 if
-    /// nothing could be gained by cutting it.
+    /// How far the motors stay below their limits over the interval with one acceleration, as a
+    /// share of the limits; 0 if bisecting it would gain nothing.
     pub(super) fn unused_capacity(&self, b0: f64, b1: f64) -> f64 {
         if self.is_straight() {
             return 0.0;
@@ -124,10 +130,10 @@ impl IntervalConstraints {
         (of(0.0, 0) + of(0.5, 1) + of(1.0, 2)) / 3.0
     }
 
-    /// Whether a motor that is used is_near on the speed rather than on the acceleration: near a place where its m' vanishes
-    /// (a zero-inertia point) a larger b at the start of a interval allows only a smaller one at its end, so going as fast
-    /// as possible up to there is not the fastest way. With `b1 = b + two_h (1 - r b) / p` that begins at `two_h r = p`;
-    /// the shorter the intervals, the narrower that region.
+    /// Whether a motor near its limit is limited by b rather than by u: near a zero-inertia point,
+    /// where its m' vanishes, a larger b at the start of an interval allows only a smaller b at its
+    /// end, so maximizing the speed up to that point is not optimal. With `b1 = b + two_h (1 - r b)
+    /// / p` this starts at `two_h r = p`; the shorter the intervals, the narrower that region.
     pub(super) fn is_near_zero_inertia_point(&self, b0: f64, b1: f64) -> bool {
         let u = (b1 - b0) / self.two_h;
         self.strips[..6].iter().any(|strip| {
@@ -135,7 +141,7 @@ impl IntervalConstraints {
         })
     }
 
-    /// Of some strips the one that is used most from b0 to b1, and by how much of its width.
+    /// The strip with the largest utilization from b0 to b1, and its utilization.
     fn active_constraint(&self, b0: f64, b1: f64, strips: &[usize]) -> (usize, f64) {
         let u = (b1 - b0) / self.two_h;
         let uses = strips.iter().map(|&index| {
@@ -149,7 +155,7 @@ impl IntervalConstraints {
         self.strips.iter().all(|strip| strip.r == 0.0)
     }
 
-    /// The time over the interval from b0 to b1, s; infinite from rest to rest where it cannot have a peak.
+    /// The duration from b0 to b1, s; infinite from rest to rest where no peak is possible.
     pub(super) fn time(&self, b0: f64, b1: f64) -> f64 {
         let length = 0.5 * self.two_h;
         let over = |length: f64, a: f64, b: f64| 2.0 * length / (a.sqrt() + b.sqrt());
@@ -161,7 +167,7 @@ impl IntervalConstraints {
         }
     }
 
-    /// Adds the phases over the interval from b0 to b1, and what limits them.
+    /// Appends the phases from b0 to b1 and records what limits them.
     pub(super) fn phases(&self, interval: &GridInterval, b0: f64, b1: f64, profile: &mut Profile) {
         let mut start = interval.start;
         let mut push = |length: f64, from: f64, to: f64| {
@@ -184,14 +190,15 @@ impl IntervalConstraints {
         }
     }
 
-    /// An even ramp; or up to a peak and down again where the motors move in proportion to the parameter, so that one
-    /// acceleration holds over all of the interval, and where it begins and ends at rest.
+    /// A ramp; or acceleration, constant speed and deceleration where the motor positions are
+    /// linear in s, so that one acceleration is feasible over the whole interval, and where it
+    /// begins and ends at rest.
     fn speed_shape(&self, b0: f64, b1: f64) -> SpeedShape {
         if !self.is_straight() && b0 + b1 > 0.0 {
             return SpeedShape::Ramp;
         }
-        // Up to `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f two_h |r|:
-        // u = (1 - |r| b) / (p + two_h |r|), and (2 b - b0 - b1) / 2 = u length.
+        // To `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f two_h |r|: u = (1
+        // - |r| b) / (p + two_h |r|), and (2 b - b0 - b1) / 2 = u length.
         let mut b = self.cap;
         for Strip { p, r } in self.strips {
             let (m1, m2) = (p + self.two_h * r.abs(), r.abs());
@@ -210,7 +217,7 @@ impl IntervalConstraints {
         }
     }
 
-    /// Books the time of a ramp to what is nearest to its limit.
+    /// Adds the duration of a ramp to the constraint that is closest to its limit.
     fn record_active_constraint(&self, b0: f64, b1: f64, duration: f64, limiting: &mut LimitingConstraints) {
         let (strip, most) = self.active_constraint(b0, b1, &[0, 1, 2, 3, 4, 5, 6, 7]);
         if b0.max(b1) / self.cap >= most {
@@ -222,7 +229,7 @@ impl IntervalConstraints {
         } else if strip >= 6 {
             limiting.rows_s += duration;
         } else {
-            // m' u + m'' b = (P - 2 f length R) u + R b, by the share f at which the strip was taken.
+            // m' u + m'' b = (P - 2 f length R) u + R b, at the fraction f of the strip.
             let (k, share) = (strip / 3, 0.5 * (strip % 3) as f64);
             let Strip { p, r } = self.strips[strip];
             let u = (b1 - b0) / self.two_h;
@@ -238,20 +245,21 @@ impl IntervalConstraints {
     }
 }
 
-/// The largest b for which the strips have a common u that leads to no b below 0.
+/// The largest b for which the strips have a common u that does not lead to b below 0.
 fn largest_feasible(strips: &[Strip], two_h: f64) -> f64 {
-    // Of every pair of a lower and an upper bound of u: lower(b) <= upper(b).
+    // For every pair of a lower and an upper bound of u: lower(b) <= upper(b).
     let mut least = 0.0_f64;
     for (i, one) in strips.iter().enumerate() {
         for other in &strips[i + 1..] {
-            // (-1 - r_i b) / p_i <= (1 - r_j b) / p_j, and with i and j exchanged; 0 / 0 where both motors stand still.
+            // (-1 - r_i b) / p_i <= (1 - r_j b) / p_j, and with i and j exchanged; 0 / 0 where both
+            // motors rest.
             least = least.max((one.p * other.r - other.p * one.r).abs() / (one.p + other.p));
         }
-        // A motor that stands still here, whatever u.
+        // A motor that rests here whatever u is.
         if one.p == 0.0 {
             least = least.max(one.r.abs());
         }
-        // -b / two_h <= (1 - r b) / p: the end is not below rest.
+        // -b / two_h <= (1 - r b) / p: b at the end is not negative.
         least = least.max(one.r - one.p / two_h);
     }
     1.0 / least

@@ -1,19 +1,20 @@
-//! Laws that give every piece the same time, whatever the motors can: those of a drawing machine's own firmware.
+//! Profiles that take the same time for every piece, whatever the motors' limits are, as the
+//! coaxial arm's own firmware does.
 //!
-//! With x from 0 to 1 over the time T of a piece of length L, the way is L y(x). Source: seed 3's report.
+//! With x from 0 to 1 over the duration T of a piece of length L, the position is L y(x).
 
 use std::f64::consts::FRAC_PI_2;
 
 use super::profile::{Phase, Profile};
 
-/// How the way goes with time.
+/// Position against time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Easing {
-    /// y = x: evenly, from a jump in speed to another.
+    /// y = x: constant speed, with speed jumps at both ends.
     Linear,
-    /// y = sin(pi x / 2): from a jump in speed, pi/2 of the mean, slower and slower to rest.
+    /// y = sin(pi x / 2): starts with a jump to pi/2 times the mean speed and decelerates to rest.
     SineOut,
-    /// y = 2 x² below one half, then 1 - 2 (1 - x)²: from rest to rest, at most twice the mean speed.
+    /// y = 2 x² for x < 1/2, then 1 - 2 (1 - x)²: from rest to rest, at most twice the mean speed.
     QuadraticInOut,
 }
 
@@ -42,7 +43,7 @@ pub(crate) fn fixed_duration(easing: Easing, length: f64, time: f64) -> Profile 
 mod tests {
     use super::*;
 
-    /// Where a law is at time t.
+    /// The position at time t.
     fn at(profile: &Profile, t: f64) -> f64 {
         let mut since = t;
         for phase in &profile.phases {
@@ -55,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn laws_go_as_they_are_defined() {
+    fn easings_match_their_definition() {
         for (easing, y) in [
             (Easing::Linear, (|x| x) as fn(f64) -> f64),
             (Easing::SineOut, |x| libm::sin(FRAC_PI_2 * x)),

@@ -1,4 +1,5 @@
-//! Speed under motor speeds, accelerations and jerks: reachable sets in the plane of b and db/ds.
+//! Time parametrization under speed, acceleration and jerk limits: controllable sets in the plane
+//! of b and db/ds.
 //!
 //! With `b = (ds/dt)²`, `c = db/ds` and `w = d²b/ds²` a motor with position m(s) has
 //!
@@ -6,19 +7,23 @@
 //! acceleration  |½ m' c + m'' b|                          <= a
 //! jerk          |½ m' w + 3/2 m'' c + m''' b|  √b         <= j
 //! ```
-//! `w` is constant on a interval, so b is a parabola and the motion `d²s/dt² = c/2 + w s/2`. Divided by √b the right side of the
-//! second, `j / √b`, is convex in b: its tangent at any b* lies below it, so with `j (3/2 - b / (2 b*)) / √b*` in its point
-//! the condition is linear and no less strict (the step by which sequential programs stay feasible: Debrouwere et al.
-//! 2013, Lee et al. 2024, arXiv 2404.07889). All conditions on (b, c, w) at a interval's start, middle and end are then
-//! half-spaces, and the set of (b, c) at a node from which the end can be reached is a convex polygon: the one of the
-//! next node, carried back through the interval, with w projected out (every upper bound of w against every lower one). Forward,
-//! the largest w at each node that stays within the next polygon. Then again with b* at the speeds found, while that gains time.
+//! `w` is constant on an interval, so b is a parabola and the motion is `d²s/dt² = c/2 + w s/2`.
+//! Divided by √b, the right side of the second constraint, `j / √b`, is convex in b. Its tangent at
+//! any b* lies below it, so with `j (3/2 - b / (2 b*)) / √b*` in its place the constraint is linear
+//! and at least as strict (the step by which sequential programs stay feasible: Debrouwere et al.
+//! 2013; Lee et al. 2024, arXiv 2404.07889). All constraints on (b, c, w) at an interval's start,
+//! middle and end are then half-spaces, and the controllable set of (b, c) at a grid point is a
+//! convex polygon: the set of the next point, propagated back through the interval, with w
+//! eliminated by comparing every upper bound of w with every lower bound. The forward pass takes
+//! the largest w at each point that stays within the next polygon. The passes are repeated with b*
+//! at the speeds found while that gains time.
 //!
-//! At rest `b` rises as `s^(4/3)`, faster than any parabola: the first interval of a path has an even jerk in time, which leads to
-//! a point on the ray `c = 4 b / (3 length)`, and the last one likewise.
+//! From rest `b` grows as `s^(4/3)`, faster than any parabola: the first interval of a path has
+//! constant jerk in time instead, which leads to a point on the ray `c = 4 b / (3 length)`, and the
+//! last one likewise.
 //!
-//! Between the points that were looked at a limit may be exceeded a little. It is looked for in more points, and the motion
-//! made slower by as much; so is all of it where no way was found.
+//! Between the points where they are enforced, limits may be exceeded slightly. The excess is
+//! measured at more points, and the motion is slowed down to compensate.
 
 use drawing::Segment;
 use kinematics::{JointPos, Machine, MotorPos};
@@ -29,22 +34,22 @@ use super::{acceleration, straight};
 use crate::joint_path::{JointPath, PathDerivatives, PathGeometry, third_derivative};
 use crate::path::Piece;
 
-/// How often b* is put where the speeds are.
+/// Largest number of passes, each with b* at the speeds of the one before.
 const PASSES: usize = 4;
 
-/// Passes end that bring no more than this share of the time.
+/// Passes end when one gains no more than this share of the duration.
 const LEAST_GAIN: f64 = 1e-3;
 
-/// A motion that would have to be slowed down by more than this between the points that were looked at is planned anew with
-/// stricter limits where that is so.
+/// Where limits are exceeded by more than this factor between the points where they are enforced,
+/// the next pass uses stricter limits.
 const EXCESS: f64 = 1.002;
 
-/// Whether any motor's jerk is limited.
+/// Whether any motor has a jerk limit.
 pub(super) fn applies(machine: &Machine) -> bool {
     machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some())
 }
 
-/// The law on a path.
+/// The profile along a path.
 pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     match &path.geometry {
         PathGeometry::Travel(..) => {
@@ -78,10 +83,11 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     }
 }
 
-/// What a motor allows at one point of a path.
+/// The constraints at one point of a path.
 #[derive(Clone, Copy, Debug)]
 struct PointConstraints {
-    /// Derivatives by s over the motors' limits: m' / v; m' / a, m'' / a; m' / j, m'' / j, m''' / j.
+    /// Derivatives with respect to s over the motors' limits: m' / v; m' / a, m'' / a; m' / j, m''
+    /// / j, m''' / j.
     speed: [f64; 2],
     acceleration: [[f64; 2]; 2],
     jerk: [[f64; 3]; 2],
@@ -108,7 +114,7 @@ impl PointConstraints {
         })
     }
 
-    /// The largest b by speeds and rows.
+    /// The largest b under the speed limits and the row deviation.
     fn cap(&self, cap: &SpeedCap) -> f64 {
         let rows = 8.0 * cap.row_deviation_mm / (cap.period_s * cap.period_s);
         let speed =
@@ -116,7 +122,7 @@ impl PointConstraints {
         (speed * speed).min(rows / self.second_derivative_bound)
     }
 
-    /// Largest shares of the limits on acceleration and jerk.
+    /// The largest utilization of the acceleration and of the jerk limits.
     fn utilization(&self, state: State, w: f64) -> (f64, f64) {
         let [b, c] = state;
         let acceleration = |[m1, m2]: [f64; 2]| (0.5 * m1 * c + m2 * b).abs();
@@ -129,7 +135,7 @@ impl PointConstraints {
 /// b and c.
 type State = [f64; 2];
 
-/// A stretch of a path with one w.
+/// A part of a path with constant w.
 #[derive(Clone, Debug)]
 struct JerkInterval {
     piece: usize,
@@ -138,26 +144,26 @@ struct JerkInterval {
     /// At its start, middle and end.
     points: [PointConstraints; 3],
     cap: f64,
-    /// On turns and near them the pen's |p'| |u| + second_derivative_bound b may be no more than this; otherwise infinite.
+    /// Bound on |p'| |u| + second_derivative_bound b of the pen near corners; infinite elsewhere.
     row_limit: f64,
     /// b* at its start, middle and end.
     tangent_points: [f64; 3],
-    /// Shares of the limits on acceleration and jerk that are used.
+    /// The shares of the acceleration and jerk limits that may be used.
     allowed: (f64, f64),
-    /// A b that its start can well be passed with, see [`set_lower_bounds`].
+    /// A b that is known to be gentle at its start, see [`set_lower_bounds`].
     lower_bound: f64,
 }
 
 const FRACTIONS: [f64; 3] = [0.0, 0.5, 1.0];
 
 impl JerkInterval {
-    /// b and c at a share of it.
+    /// b and c at a fraction of it.
     fn state(&self, from: State, w: f64, share: f64) -> State {
         let s = share * self.length;
         [from[0] + s * (from[1] + 0.5 * s * w), from[1] + s * w]
     }
 
-    /// Puts b* where the speed is now.
+    /// Sets b* to the current speeds.
     fn linearize_at(&mut self, from: State, to: State) {
         let w = (to[1] - from[1]) / self.length;
         let speeds = FRACTIONS.map(|share| self.state(from, w, share)[0]);
@@ -173,7 +179,7 @@ impl JerkInterval {
         self.allowed = (stricter(self.allowed.0, excess.0), stricter(self.allowed.1, excess.1));
     }
 
-    /// All conditions on (b, c) at its start and w: `x b + y c + z w <= offset`.
+    /// All constraints on w and on (b, c) at its start: `x b + y c + z w <= offset`.
     fn conditions(&self) -> Vec<[f64; 4]> {
         let mut all = Vec::with_capacity(40);
         for (j, share) in FRACTIONS.into_iter().enumerate() {
@@ -208,11 +214,12 @@ impl JerkInterval {
         all
     }
 
-    /// The largest b that an even jerk in time from rest may lead to at the other end of the interval: all limits grow with
-    /// b there, so their worst over the interval is at that end.
+    /// The largest b at the other end that constant jerk from rest may lead to. The utilization of
+    /// all limits grows with b, so it is largest at that end.
     fn largest_from_rest(&self) -> f64 {
         let h = self.length;
-        // With b there: c = 4 b / (3 h), u = c / 2, and the jerk of s is √b³ / (rest of this) by s = j t³/6.
+        // With b there: c = 4 b / (3 h), u = c / 2, and the jerk of s is √b³ / (the rest of this),
+        // by s = j t³/6.
         let jerk = JERK_OF_REST / (h * h);
         let mut most = self.cap;
         for point in &self.points {
@@ -233,17 +240,18 @@ impl JerkInterval {
     }
 }
 
-/// `j h² / √b³` for a motion with the jerk j from rest to b at h: with `h = j t³/6` and `b = j² t⁴/4` it is
-/// `(t⁶ j³ / 36) (8 / (j³ t⁶)) = 2/9`.
+/// `j h² / √b³` for motion with the jerk j from rest to b at h: with `h = j t³/6` and `b = j² t⁴/4`
+/// it is `(t⁶ j³ / 36) (8 / (j³ t⁶)) = 2/9`.
 const JERK_OF_REST: f64 = 2.0 / 9.0;
 
-/// c over b at the end of a interval that begins at rest.
+/// c over b at the end of an interval that begins at rest.
 fn rest_ray_slope(length: f64) -> f64 {
     4.0 / (3.0 * length)
 }
 
-/// The path in intervals short enough for one w each: by time, a fifth of what a motor needs to build up its acceleration, and
-/// ever shorter towards rest. Nothing if a point of it has no pose, which lifting the path would have found.
+/// Divides the path into intervals short enough for constant w: in time, a fifth of what a motor
+/// needs to build up its acceleration, and shorter towards rest. Returns `None` if a point has no
+/// pose, which `JointPath::from_section` has excluded.
 fn intervals(
     machine: &Machine,
     path: &JointPath,
@@ -280,7 +288,7 @@ fn intervals(
                 .min(0.25 * (to_rest + 4.0 * ramp))
                 .min(0.1 * total)
                 .min(longest);
-            // The last steps towards rest as short as the first away from it.
+            // The last steps towards rest are as short as the first ones from rest.
             let wanted = wanted.min(0.25 * (total - s).max(0.0) + ramp).max(1e-6 * total);
             let length = if left < 1.5 * wanted { left } else { wanted };
             let start = interval.start + at;
@@ -313,17 +321,18 @@ fn intervals(
     Some(intervals)
 }
 
-/// What is left of a length, unless that is but a rounding error: that would be a interval on which no law can be found.
+/// What is left of a length; `None` if it is rounding error, on which no profile exists.
 fn remaining_length(length: f64, at: f64) -> Option<f64> {
     let left = length - at;
     (left > 1e-9 * length).then_some(left)
 }
 
-/// Finds speeds with which the path can be followed gently: no turn needs more than its share, and speeding up and slowing
-/// down need no more acceleration than can be given up again while the speed changes by a half.
+/// Sets lower bounds on the speed: speeds at which the path can be followed gently. No corner uses
+/// more than a share of the limits, and accelerating and braking use no more acceleration than can
+/// be released while the speed changes by half.
 ///
-/// Going as fast as possible from the start would brake for a turn so late that the pen nearly stands when the brake is
-/// released. SquaredSpeeds below a share of these are therefore not taken.
+/// Without them, maximizing the speed from the start would brake for a corner so late that the pen
+/// almost stops before the brake is released.
 fn set_lower_bounds(intervals: &mut [JerkInterval]) {
     let total: f64 = intervals.iter().map(|interval| interval.length).sum();
     let mut at = 0.0_f64;
@@ -355,20 +364,21 @@ fn set_lower_bounds(intervals: &mut [JerkInterval]) {
 }
 
 impl PointConstraints {
-    /// A b* to begin with: no more than b, than what jerk allows on a turn, and than what it allows so near to rest.
+    /// An initial b*: at most b, what jerk allows in a corner, and what jerk allows this close to
+    /// rest.
     fn initial_tangent_point(&self, b: f64, to_rest: f64) -> f64 {
         let (mut turn, mut ramp) = (0.0_f64, 0.0_f64);
         for [m1, _, m3] in self.jerk {
             (turn, ramp) = (turn.max(m3.abs()), ramp.max(m1.abs()));
         }
-        // b = (9/2 j s²)^(2/3) / ... by JERK_OF_REST: √b³ = j s² / (2/9).
+        // By JERK_OF_REST: √b³ = j s² / (2/9).
         let jerk = to_rest * to_rest / (JERK_OF_REST * ramp);
         let third = |x: f64| libm::cbrt(x * x);
         b.min(third(1.0 / turn)).min(third(jerk)).max(1e-12)
     }
 }
 
-/// (ds/dt)² along a profile, asked for in order.
+/// (ds/dt)² along a profile, queried in order.
 struct SquaredSpeeds<'a> {
     phases: &'a [Phase],
     at: usize,
@@ -389,19 +399,20 @@ impl SquaredSpeeds<'_> {
     }
 }
 
-/// The states at all nodes; nothing where no way is found.
+/// The states at all grid points; `None` if no motion is found.
 fn solve(intervals: &[JerkInterval]) -> Option<Vec<State>> {
     [0.5, 0.1, 0.0].into_iter().find_map(|bound_share| solve_above(intervals, bound_share))
 }
 
-/// The states at all nodes, with b no less than so much of the set_lower_bounds.
+/// The states at all grid points, with b at least `bound_share` times the lower bounds.
 fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State>> {
     let count = intervals.len();
     if count < 4 {
         return None;
     }
     let (last, last_but_one) = (&intervals[count - 1], &intervals[count - 2]);
-    // Sets at the starts of intervals 1 to count - 2; from that of the last but one the last one's ray is met exactly.
+    // Sets at the starts of intervals 1 to count - 2. From the last of them the ray of the terminal
+    // interval is met exactly.
     let terminal = TerminalInterval::new(last_but_one, rest_ray_slope(last.length));
     let mut sets = vec![Polygon::default(); count - 1];
     sets[count - 2] = terminal.set(last_but_one, bound_share, last.largest_from_rest());
@@ -431,7 +442,8 @@ fn solve_above(intervals: &[JerkInterval], bound_share: f64) -> Option<Vec<State
     states.iter().flatten().all(|x| x.is_finite()).then_some(states)
 }
 
-/// The interval before the last: its w is such that it ends on the ray on which an even jerk leads to rest.
+/// The interval before the last: its w is such that it ends on the ray from which constant jerk
+/// leads to rest.
 struct TerminalInterval {
     /// w = x b + y c.
     w: [f64; 2],
@@ -463,15 +475,17 @@ impl TerminalInterval {
     }
 }
 
-/// All states at a interval's start that could come from rest and go to rest.
+/// All states at an interval's start that can be reached from rest and from which rest can be
+/// reached.
 ///
-/// Under √b the jerk's condition vanishes with b: what it forbids there must be said apart, or speeds would bounce off 0.
-/// With the jerk j a motion that slows down by u needs the speed u² / (2 j) to end that, so `c² <= 8 j √b`: a convex
-/// set. These are corners of the one for twice the jerk, so that the chords between them take nothing away.
+/// Multiplied by √b, the jerk constraint vanishes with b, so what it excludes there must be stated
+/// separately. A motion with jerk j that decelerates at u needs the speed u² / (2 j) to end its
+/// deceleration, so `c² <= 8 j √b`: a convex set. These are corners of the set for twice the jerk,
+/// so that the chords between them exclude nothing.
 fn initial_set(interval: &JerkInterval, bound_share: f64) -> Polygon {
     let point = &interval.points[0];
     let jerk = 1.0 / point.jerk.iter().map(|[m1, ..]| m1.abs()).fold(0.0, f64::max);
-    // And |½ m' c| <= 1 + |m''| b, whatever the jerk.
+    // And |½ m' c| <= 1 + |m''| b, whatever the jerk is.
     let c = point.acceleration.iter().map(|[m1, m2]| 2.0 * (1.0 + m2.abs() * interval.cap) / m1.abs());
     let most = c.fold(f64::INFINITY, f64::min);
     let at = |share: &f64| {
@@ -487,7 +501,7 @@ fn initial_set(interval: &JerkInterval, bound_share: f64) -> Polygon {
     set
 }
 
-/// The states at a interval's start from which some w leads into `next`.
+/// The states at an interval's start from which some w leads into `next`.
 fn controllable_set(interval: &JerkInterval, bound_share: f64, next: &Polygon) -> Polygon {
     let mut set = initial_set(interval, bound_share);
     let (mut upper, mut lower) = (Vec::with_capacity(40), Vec::with_capacity(40));
@@ -502,7 +516,7 @@ fn controllable_set(interval: &JerkInterval, bound_share: f64, next: &Polygon) -
     }
     set.keep_tight(&mut upper);
     set.keep_tight(&mut lower);
-    // w <= offset - x b - y c for the upper ones, w >= x b + y c - offset for the lower.
+    // w <= offset - x b - y c for the upper bounds, w >= x b + y c - offset for the lower bounds.
     for [x, y, offset] in &upper {
         for [x1, y1, room1] in &lower {
             set.clip(x + x1, y + y1, offset + room1);
@@ -512,14 +526,14 @@ fn controllable_set(interval: &JerkInterval, bound_share: f64, next: &Polygon) -
     set
 }
 
-/// The conditions on a state at a interval's start and w for getting into a set through the interval.
+/// The constraints on w and the state at an interval's start for ending in `set`.
 fn propagate(interval: &JerkInterval, set: &Polygon) -> impl Iterator<Item = [f64; 4]> {
     let h = interval.length;
     // b at the end is b + h c + h²/2 w, c there is c + h w.
     set.edges().map(move |[x, y, offset]| [x, x * h + y, 0.5 * x * h * h + y * h, offset])
 }
 
-/// The largest w by which a interval leads from a state into a set; nothing if there is none at all.
+/// The largest w by which an interval leads from a state into a set; `None` if there is none.
 fn largest_w_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Option<f64> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     for [x, y, z, offset] in interval.conditions().into_iter().chain(propagate(interval, set)) {
@@ -533,12 +547,12 @@ fn largest_w_into(set: &Polygon, interval: &JerkInterval, [b, c]: State) -> Opti
     if set.0.is_empty() || !(high.is_finite() && low.is_finite()) {
         return None;
     }
-    // They cross by no more than a rounding error, for the state is in the set before.
+    // They cross by rounding error only, since the state is in the controllable set.
     Some(if high >= low { high } else { 0.5 * (high + low) })
 }
 
-/// The phases through the states, slowed down until the limits hold between the points that were looked at too; and by how
-/// much each interval exceeded its limits on acceleration and jerk.
+/// The phases through the states, slowed down until the limits hold between the enforced points
+/// too; and by how much each interval exceeded its limits on acceleration and jerk.
 fn build_profile(
     machine: &Machine,
     section: &[Piece],
@@ -581,7 +595,7 @@ fn build_profile(
                 0.0 => interval.points[0],
                 0.5 => interval.points[1],
                 1.0 => interval.points[2],
-                // The curve is within reach all along, so there always is a point.
+                // The whole curve is within reach, so the point always exists.
                 _ => PointConstraints::at(machine, &section[interval.piece], interval.start + share * h)
                     .unwrap_or(interval.points[1]),
             };
@@ -596,7 +610,7 @@ fn build_profile(
     (profile.slowed(slower), excesses)
 }
 
-/// The largest of some even samples, or the top of the parabola through three of them.
+/// The largest of equidistant samples, or the vertex of the parabola through three of them.
 fn peak<const N: usize>(samples: [f64; N]) -> f64 {
     let top = |w: &[f64]| {
         let (slope, second_derivative_bound) = (0.5 * (w[2] - w[0]), 2.0 * w[1] - w[0] - w[2]);
@@ -609,7 +623,7 @@ fn peak<const N: usize>(samples: [f64; N]) -> f64 {
     samples.windows(3).map(top).fold(samples[0].max(samples[N - 1]), f64::max)
 }
 
-/// Books the time of a interval to what is nearest to its limit.
+/// Adds the duration of an interval to the constraint that is closest to its limit.
 fn record_active_constraint(
     interval: &JerkInterval,
     from: State,
@@ -644,15 +658,16 @@ fn record_active_constraint(
     }
 }
 
-/// The time over a length with b from one end to the other a parabola: `d²s/dt² = u + g s` with `g = w / 2`.
+/// The duration over a length on which b is a parabola: `d²s/dt² = u + g s` with `g = w / 2`.
 ///
-/// With k² = g, `v k + u` grows as `exp(k t)` and `v k - u` falls as `exp(-k t)`; with k² = -g the point (k v, u) turns by k t.
+/// With k² = g, `v k + u` grows as `exp(k t)` and `v k - u` decays as `exp(-k t)`; with k² = -g the
+/// point (k v, u) rotates by k t.
 fn duration(length: f64, from: State, to: State, w: f64) -> f64 {
     let (v0, v1) = (from[0].max(0.0).sqrt(), to[0].max(0.0).sqrt());
     let (u0, u1) = (0.5 * from[1], 0.5 * to[1]);
     let mean = from[0] + 0.5 * length * (from[1] + 0.25 * length * w);
     if (w * length * length).abs() < 1e-4 * mean {
-        // b is nearly a line; what w adds: (w / 4) ∫ s (h - s) b^(-3/2) ds.
+        // b is nearly linear; the correction for w is (w / 4) ∫ s (h - s) b^(-3/2) ds.
         return 2.0 * length / (v0 + v1) + w * length * length * length / (24.0 * mean * mean.sqrt());
     }
     let k = (0.5 * w).abs().sqrt();
@@ -664,8 +679,8 @@ fn duration(length: f64, from: State, to: State, w: f64) -> f64 {
     }
 }
 
-/// A law that knows no jerk, slowed down until its jumps in acceleration, at most from one limit to the other, are none
-/// that rows a period apart could show.
+/// A profile without jerk limits, slowed down until its acceleration jumps, at most from one limit
+/// to the other, do not exceed the jerk limits in rows one period apart.
 fn slowed_until_smooth(machine: &Machine, profile: Profile, cap: &SpeedCap) -> Profile {
     let of = |motor: &kinematics::Motor| {
         motor
@@ -683,9 +698,10 @@ mod tests {
     use super::remaining_length;
 
     proptest! {
-        /// A interval of 1e-17 mm once stood at the end of a piece, and the plan of examples/rosette.hpgl took 31 minutes instead of 13.
+        /// An interval of 1e-17 mm at the end of a piece once made the plan of
+        /// examples/rosette.hpgl take 31 minutes instead of 13.
         #[test]
-        fn a_rounding_error_is_no_cell(length in 1e-3..1e3f64, share in 0.0..1.0f64) {
+        fn rounding_error_is_no_interval(length in 1e-3..1e3f64, share in 0.0..1.0f64) {
             let at = share * length;
             if let Some(left) = remaining_length(length, at) {
                 prop_assert_eq!(remaining_length(length, at + left), None);

@@ -28,8 +28,8 @@ pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     }
 }
 
-/// The same on the path's own grid: without jerk limits and without refinement, ten times as fast to
-/// compute, with a duration within a few per cent of the optimum.
+/// The same on the path's own grid: without jerk limits and without refinement, ten times as fast
+/// to compute, with a duration within a few per cent of the optimum.
 #[cfg(feature = "unstable")]
 pub fn profile_without_refinement(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     acceleration::profile_without_refinement(machine, path, cap)

@@ -1,27 +1,27 @@
-//! Convex sets in the plane, by their corners.
+//! Convex polygons in the plane.
 
 /// A point of the plane.
 pub(super) type Vertex = [f64; 2];
 
-/// Corners of a polygon at most; beyond that those go that cost least.
+/// Largest number of corners; beyond it the corners with the least area are removed.
 const CORNERS: usize = 24;
 
-/// A convex polygon, its corners counterclockwise; without any it is empty.
+/// A convex polygon with its corners in counterclockwise order; without corners it is empty.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polygon(pub(super) Vec<Vertex>);
 
 impl Polygon {
-    /// Its edges as conditions `x p + y q <= offset` on a point (p, q) inside.
+    /// Its edges as constraints `x p + y q <= offset` on a point (p, q) inside.
     pub(super) fn edges(&self) -> impl Iterator<Item = [f64; 3]> {
         let edges = self.0.iter().zip(self.0.iter().cycle().skip(1));
         edges.map(|(p, q)| {
-            // To the left of the edge.
+            // The interior is to the left of the edge.
             let (x, y) = (q[1] - p[1], p[0] - q[0]);
             [x, y, x * p[0] + y * p[1]]
         })
     }
 
-    /// Keeps what fulfils `x p + y q <= offset`.
+    /// Intersects with the half-plane `x p + y q <= offset`.
     pub(super) fn clip(&mut self, x: f64, y: f64, offset: f64) {
         let off = |p: &Vertex| x * p[0] + y * p[1] - offset;
         let scale = self.0.iter().map(|p| (x * p[0]).abs() + (y * p[1]).abs()).fold(offset.abs(), f64::max);
@@ -42,7 +42,7 @@ impl Polygon {
         }
     }
 
-    /// Drops those bounds `offset - x p - y q` that on this set are nowhere below some other one.
+    /// Removes bounds `offset - x p - y q` that are nowhere on this polygon below another one.
     pub(super) fn keep_tight(&self, bounds: &mut Vec<[f64; 3]>) {
         let at = |[x, y, offset]: &[f64; 3], p: &Vertex| offset - x * p[0] - y * p[1];
         let mut kept: Vec<[f64; 3]> = Vec::with_capacity(bounds.len());
@@ -57,7 +57,7 @@ impl Polygon {
         *bounds = kept;
     }
 
-    /// How far p can go along the ray `q = slope p`; nothing if the ray does not meet it.
+    /// The largest p on the ray `q = slope p`; `None` if the ray does not meet the polygon.
     pub(super) fn farthest(&self, slope: f64) -> Option<f64> {
         let corners = &self.0;
         let mut far: Option<f64> = None;
@@ -71,7 +71,7 @@ impl Polygon {
         far
     }
 
-    /// Takes away corners that cost little until there are few.
+    /// Removes the corners with the least area until at most [`CORNERS`] are left.
     pub(super) fn simplify(&mut self) {
         while self.0.len() > CORNERS {
             let count = self.0.len();
@@ -98,9 +98,9 @@ mod tests {
     }
 
     proptest! {
-        /// What is cut away was outside, and what is left is inside, of every condition.
+        /// What is removed violates a constraint; what is left satisfies all of them.
         #[test]
-        fn clipping_keeps_what_fulfils_all_conditions(
+        fn clipped_polygon_satisfies_constraints(
             conditions in proptest::collection::vec((-3.0..3.0f64, -3.0..3.0f64, -0.5..2.0f64), 0..40),
             points in proptest::collection::vec((-1.0..1.0f64, -1.0..1.0f64), 20),
         ) {
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_leaves_a_square_through_its_far_side() {
+    fn ray_through_square() {
         let square = Polygon(vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
         assert_eq!(square.farthest(0.5), Some(2.0));
         assert_eq!(square.farthest(4.0), Some(0.5));

@@ -1,18 +1,19 @@
-//! Travel under jerk limits: rest to rest on a straight way in joint space, in closed form.
+//! Travel under jerk limits: rest to rest on a line in joint space, in closed form.
 
 use kinematics::{Machine, MotorPos};
 
 use super::profile::{Phase, Profile};
 
-/// A straight way in joint space, no faster than `fastest`: even jerk up to the largest acceleration, and so on, both halves alike.
+/// Seven phases of constant jerk on a line in joint space, no faster than `fastest`, symmetric in
+/// time.
 pub(super) fn profile(machine: &Machine, change: MotorPos, fastest: f64) -> Profile {
     let least = |of: &dyn Fn(usize) -> f64| of(0).min(of(1));
     let motors = machine.motors();
     let v = least(&|k| motors[k].max_speed_ticks_s / change[k].abs()).min(fastest);
     let a = least(&|k| motors[k].max_acceleration_ticks_s2 / change[k].abs());
     let j = least(&|k| motors[k].max_jerk_ticks_s3.unwrap_or(f64::INFINITY) / change[k].abs());
-    // The time to reach the speed V is V/a + a/j, or 2 √(V/j) where a is not reached; the way from rest to rest without
-    // a stretch at V is V times that.
+    // The time to reach the speed V is V/a + a/j, or 2 √(V/j) where a is not reached. The distance
+    // from rest to rest without a phase at V is V times that.
     let time_to = |speed: f64| if speed >= a * a / j { speed / a + a / j } else { 2.0 * (speed / j).sqrt() };
     let mut top = v;
     if top * time_to(top) > 1.0 {

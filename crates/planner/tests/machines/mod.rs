@@ -1,4 +1,5 @@
-//! Machines for the planner's tests, by hand: the shapes of the four seeds with round numbers.
+//! Machines for the planner's tests: a coaxial arm, a CoreXY and a polar machine with round
+//! numbers.
 #![allow(dead_code, reason = "not every test that shares this module needs all of it")]
 
 use drawing::Rect;
@@ -83,7 +84,7 @@ pub(crate) fn polar() -> Machine {
     )
 }
 
-/// The machine with motors that need so many s to build up their largest acceleration.
+/// The machine with jerk limits such that motors reach their largest acceleration in `build_up` s.
 pub(crate) fn with_jerk(machine: &Machine, build_up: f64) -> Machine {
     let mut parts = machine.parts().clone();
     for motor in &mut parts.motors {
