@@ -56,6 +56,10 @@
 //! assert!(matches!(error, PlanError::OutOfReach { stroke: 0, .. }));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+#![cfg_attr(
+    not(feature = "unstable"),
+    allow(unreachable_pub, reason = "the feature `unstable` exports these items")
+)]
 
 mod error;
 mod joint_path;

@@ -105,30 +105,8 @@ fn to_polyline(p: Point, line: &[Point]) -> f64 {
 }
 
 /// Checks |first difference| <= v T, |second difference| <= a T² and |third difference| <= j T³ in
-/// the exact positions of every row, and that the pen's continuous path is within the tolerance of
-/// the drawing, in both directions.
-fn stays_within(
-    machine: &Machine,
-    drawing: &Drawing,
-    tolerance: f64,
-    period_us: u64,
-) -> Result<(), TestCaseError> {
-    let placed = fitted(machine, drawing);
-    let settings = Settings::new(tolerance, period_us);
-    let trajectory = plan(machine, placed.clone(), &settings).expect("it fits");
-    let rows: Vec<ExactRow> = trajectory.rows().collect();
-    let period = period_us as f64 * 1e-6;
-
-    let (first, last) = (rows.first().expect("rows").row, rows.last().expect("rows").row);
-    let start = machine.motor_positions(&machine.start());
-    prop_assert_eq!(first.ticks, [start[0].round() as i64, start[1].round() as i64]);
-    prop_assert_eq!(last.ticks, first.ticks);
-    prop_assert_eq!((first.t_us, first.pen, last.pen), (0, 0, 0));
-    prop_assert_eq!(last.t_us, trajectory.duration_us());
-    prop_assert_eq!(rows.len() as u64, trajectory.row_count());
-    prop_assert!(rows.windows(2).all(|w| w[1].row.t_us > w[0].row.t_us));
-
-    let all = filled(&rows, period_us);
+/// exact positions one period apart.
+fn differences_within_limits(machine: &Machine, all: &[[f64; 2]], period: f64) -> Result<(), TestCaseError> {
     // With jerk limits, accelerations are enforced at grid points, and between them as far as
     // samples show.
     let slack = if machine.motors()[0].max_jerk_ticks_s3.is_some() { 1e-4 } else { 1e-6 };
@@ -163,6 +141,34 @@ fn stays_within(
             );
         }
     }
+    Ok(())
+}
+
+/// Checks |first difference| <= v T, |second difference| <= a T² and |third difference| <= j T³ in
+/// the exact positions of every row, and that the pen's continuous path is within the tolerance of
+/// the drawing, in both directions.
+fn stays_within(
+    machine: &Machine,
+    drawing: &Drawing,
+    tolerance: f64,
+    period_us: u64,
+) -> Result<(), TestCaseError> {
+    let placed = fitted(machine, drawing);
+    let settings = Settings::new(tolerance, period_us);
+    let trajectory = plan(machine, placed.clone(), &settings).expect("it fits");
+    let rows: Vec<ExactRow> = trajectory.rows().collect();
+    let period = period_us as f64 * 1e-6;
+
+    let (first, last) = (rows.first().expect("rows").row, rows.last().expect("rows").row);
+    let start = machine.motor_positions(&machine.start());
+    prop_assert_eq!(first.ticks, [start[0].round() as i64, start[1].round() as i64]);
+    prop_assert_eq!(last.ticks, first.ticks);
+    prop_assert_eq!((first.t_us, first.pen, last.pen), (0, 0, 0));
+    prop_assert_eq!(last.t_us, trajectory.duration_us());
+    prop_assert_eq!(rows.len() as u64, trajectory.row_count());
+    prop_assert!(rows.windows(2).all(|w| w[1].row.t_us > w[0].row.t_us));
+
+    differences_within_limits(machine, &filled(&rows, period_us), period)?;
 
     // Ink by stroke: from a pen-down row to the next pen-up row.
     let mut strokes = placed.strokes.iter();
@@ -206,6 +212,34 @@ proptest! {
         period_us in prop_oneof![Just(10_000u64), 500..60_000u64],
     ) {
         stays_within(&machine, &drawing, tolerance, period_us)?;
+    }
+}
+
+/// A polyline with short and long pieces, an arc and a dot.
+fn mixed_drawing() -> Drawing {
+    let point = |x: f64, y: f64| Point::new(x, y);
+    let mut arc = polyline(vec![point(0.2, 0.2), point(0.5, 0.2)]);
+    arc.arc(EllipticArc::circular(point(0.5, 0.4), 0.2, -std::f64::consts::FRAC_PI_2, 4.0));
+    let zigzag = (0..12).map(|k| point(0.05 * f64::from(k), 0.7 + 0.01 * f64::from(k % 2))).collect();
+    Drawing { strokes: vec![arc, polyline(zigzag), polyline(vec![point(0.9, 0.9)])] }
+}
+
+/// Third differences of the exact positions over whole plans, travel included, on every machine.
+#[test]
+fn jerk_limits_hold_in_third_differences_of_rows() {
+    for plain in [machines::arm(), machines::corexy(), machines::polar()] {
+        for build_up in [0.005, 0.05] {
+            let machine = machines::with_jerk(&plain, build_up);
+            let placed = fitted(&machine, &mixed_drawing());
+            let trajectory = plan(&machine, placed, &Settings::new(0.1, 2000)).expect("it fits");
+            let rows: Vec<ExactRow> = trajectory.rows().collect();
+            differences_within_limits(&machine, &filled(&rows, 2000), 0.002).expect("limits hold");
+            // The same plan without jerk limits violates them.
+            let placed = fitted(&plain, &mixed_drawing());
+            let trajectory = plan(&plain, placed, &Settings::new(0.1, 2000)).expect("it fits");
+            let rows: Vec<ExactRow> = trajectory.rows().collect();
+            assert!(differences_within_limits(&machine, &filled(&rows, 2000), 0.002).is_err());
+        }
     }
 }
 

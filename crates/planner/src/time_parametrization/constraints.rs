@@ -8,10 +8,13 @@
 //! ```
 //! `u` is constant on an interval, so b is linear in s. The constraints are enforced at the
 //! interval's start, middle and end, with limits lowered by [`GridInterval::interpolation_error`].
-//! With `b(f) = b + 2 f length u` at the fraction f of the interval an acceleration limit is `|P u
-//! + R b| <= 1` with `P = (m'_f + 2 f length m''_f) / a` and `R = m''_f / a`: six strips in the
-//! plane of (u, b), and two more near corners for the deviation of linear motion between rows (see
-//! `path::slow_zones`).
+//! With `b(f) = b + 2 f length u` at the fraction f of the interval an acceleration limit is
+//!
+//! ```text
+//! |P u + R b| <= 1     P = (m'_f + 2 f length m''_f) / a     R = m''_f / a
+//! ```
+//! These are six strips in the plane of (u, b), and two more near corners for the deviation of
+//! linear motion between rows (see `path::slow_zones`).
 //!
 //! The programs in (u, b) are solved in closed form by comparing every lower bound of u with every
 //! upper bound.

@@ -144,7 +144,7 @@ struct JerkInterval {
     /// At its start, middle and end.
     points: [PointConstraints; 3],
     cap: f64,
-    /// Bound on |p'| |u| + second_derivative_bound b of the pen near corners; infinite elsewhere.
+    /// Bound on `|p'| |u| + second_derivative_bound b` of the pen near corners; infinite elsewhere.
     row_limit: f64,
     /// b* at its start, middle and end.
     tangent_points: [f64; 3],

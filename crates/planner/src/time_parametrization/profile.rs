@@ -5,7 +5,7 @@
 ///
 /// With `t` from its beginning: `s = start + speed S + acceleration C + jerk t³ / 6`, where `S = t`
 /// and `C = t²/2`. If the acceleration changes with position,
-/// `d²s/dt² = acceleration + acceleration_slope (s - start)`: then, with k² = acceleration_slope,
+/// `d²s/dt² = acceleration + acceleration_slope (s - start)`: then, with k² that slope,
 /// `S = sinh(k t) / k` and `C = (cosh(k t) - 1) / k²` (sin and cos where the slope is negative). At
 /// most one of `jerk` and `acceleration_slope` is not 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
