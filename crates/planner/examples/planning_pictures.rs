@@ -209,8 +209,9 @@ fn most(machine: &Machine, interval: &GridInterval, sample: usize) -> f64 {
     let [a, b] = machine.motors();
     let (first, second) = (interval.first[sample], interval.second[sample]);
     let speed = (a.max_speed_ticks_s / first[0].abs()).min(b.max_speed_ticks_s / first[1].abs());
-    let room = a.max_acceleration_ticks_s2 * first[1].abs() + b.max_acceleration_ticks_s2 * first[0].abs();
-    speed.min((room / (first[0] * second[1] - first[1] * second[0]).abs()).sqrt())
+    let capacity =
+        a.max_acceleration_ticks_s2 * first[1].abs() + b.max_acceleration_ticks_s2 * first[0].abs();
+    speed.min((capacity / (first[0] * second[1] - first[1] * second[0]).abs()).sqrt())
 }
 
 /// Speed against acceleration of both motors of an arm, row by row.

@@ -240,10 +240,10 @@ struct Motions<'a> {
     batch: VecDeque<Option<Result<PlannedStroke, OutOfReach>>>,
     /// The predicted pose after the batch.
     predicted: JointPos,
-    /// The pose after all motions so far.
+    /// The pose after all queued motions.
     pose: JointPos,
     queue: VecDeque<Motion>,
-    /// Whether the pen is down after all motions so far.
+    /// Whether the pen is down after all queued motions.
     is_down: bool,
     /// Whether the travel back to the start pose is queued.
     finished: bool,

@@ -391,7 +391,7 @@ fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) ->
     let belts = file("points.txt", &text)?;
     let longest = stages.paths.iter().max_by_key(|path| path.intervals.len()).context("no joint path")?;
     let nodes = file("nodes.txt", &nodes(machine, longest))?;
-    let Some(said) = run_python(python, &script, &belts, &nodes)? else {
+    let Some(output) = run_python(python, &script, &belts, &nodes)? else {
         println!(
             "toppra is not installed for `{python}` (python3 -m pip install toppra numpy): nothing beside our figures"
         );
@@ -412,7 +412,7 @@ fn toppra(python: &str, points: &[Point], machine: &Machine, stages: &Stages) ->
             1e-6 * nodes as f64 / seconds
         );
     }
-    for line in said.lines() {
+    for line in output.lines() {
         let mut fields = line.split('\t');
         let name = format!("toppra: {}", fields.next().unwrap_or_default());
         let mut number = || fields.next().and_then(|field| field.parse::<f64>().ok()).unwrap_or(f64::NAN);

@@ -1,6 +1,6 @@
 """toppra (Pham & Pham) on the planner's workload: as its users run it, and on plotplan's own path.
 
-usage: toppra_side.py POINTS NODES   both in mm of belt; prints one line a run, tab-separated:
+usage: toppra_side.py POINTS NODES   both in mm of belt; prints one tab-separated line per run:
 name, nodes, CPU s, motion time s, worst acceleration in finite differences of 1 ms as a share of the limit, mm off
 """
 import sys
@@ -81,13 +81,13 @@ def to_chords(p, start, chord):
 
 
 def off_polyline(_):
-    """How far the spline gets off the points' polyline, mm of pen: a = x + y, b = x - y stretch lengths by sqrt(2)."""
+    """Largest distance between the spline and the polyline, mm of pen: a = x + y, b = x - y stretch lengths by sqrt(2)."""
     inside = np.repeat(np.arange(len(chords)), 8)
     p = spline(way[inside] + np.tile(np.linspace(0, 1, 8, endpoint=False), len(chords)) * chords[inside])
     start, chord = points[:-1], np.diff(points, axis=0)
     own = to_chords(p, start[inside], chord[inside])
     worst = 0.0
-    for k in np.argsort(-own):  # from its own chord is a bound on how far a point is from all of them
+    for k in np.argsort(-own):  # the distance to its own chord bounds the distance to all of them
         if own[k] <= worst:
             break
         worst = max(worst, to_chords(p[k], start, chord).min())

@@ -1,7 +1,8 @@
-//! Profiles that take the same time for every piece, whatever the motors' limits are, as the
-//! coaxial arm's own firmware does.
+//! Profiles that take the same time for every piece, whatever the motors' limits are.
 //!
-//! With x from 0 to 1 over the duration T of a piece of length L, the position is L y(x).
+//! With x from 0 to 1 over the duration T of a piece of length L, the position is L y(x). The sine
+//! and quadratic easings are those of the CoreXY worktable's firmware (report 3 in
+//! docs/references.md).
 
 use std::f64::consts::FRAC_PI_2;
 
