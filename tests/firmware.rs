@@ -12,7 +12,8 @@ use backends::device::{Device, Ebb, Grbl};
 use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::{Affine, Drawing, Rect};
 use kinematics::{
-    Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, MotorPos, PenLimits, Polar,
+    Cartesian, JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, MotorPos, PenLimits,
+    Polar,
 };
 use plan::{Header, Limits, Row, TickTable};
 use serde_json::Value;
@@ -71,8 +72,8 @@ fn with_one_pen(mut drawing: Drawing) -> Drawing {
 }
 
 /// A machine with a fine resolution: x and y in mm, or angle in degrees and radius in mm.
-fn ruler(geometry: Geometry) -> Machine {
-    let angle = geometry.joint_is_angle()[0];
+fn ruler(mechanism: impl Mechanism + 'static) -> Machine {
+    let angle = mechanism.joint_kinds()[0] == JointKind::Revolute;
     let motor = |name: &str, counts: f64| Motor {
         name: name.into(),
         ticks_per_unit: counts,
@@ -84,8 +85,8 @@ fn ruler(geometry: Geometry) -> Machine {
     let first = if angle { FINE.to_degrees() } else { FINE };
     Machine::new(MachineParts {
         name: "ruler".into(),
-        geometry,
-        joints: [Joint::FREE; 2],
+        mechanism: std::sync::Arc::new(mechanism),
+        joints: [JointRange::FREE; 2],
         min_manipulability: 0.0,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: [motor("a", first), motor("b", FINE)],
@@ -252,7 +253,7 @@ fn coaxial_commands_ink() {
 
 #[test]
 fn coaxial_commands_in_inches_ink() {
-    let machine = ruler(Geometry::Cartesian(Cartesian));
+    let machine = ruler(Cartesian);
     let sheet = preset("coaxial").sheet();
     for file in DRAWINGS {
         let plan = plan(file, "coaxial", &[]);
@@ -349,7 +350,7 @@ fn polar_ink(points: impl Iterator<Item = Point>) -> Lines {
 
 #[test]
 fn polar_csv_and_c_arrays_ink() {
-    let machine = ruler(Geometry::Polar(Polar));
+    let machine = ruler(Polar);
     let plan = plan(ONE_STROKE, "polar", &[]);
     let drawing = placed(ONE_STROKE, &plan);
     let table = polar_points(&convert(ONE_STROKE, "polar", "polar-csv", &[]));
@@ -481,7 +482,7 @@ fn as_grbl(text: &str) -> String {
 
 #[test]
 fn gcode_ink_with_arcs() {
-    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    let ruler = ruler(Cartesian);
     for file in DRAWINGS {
         let plan = plan(file, "cartesian", &[]);
         let drawing = with_one_pen(placed(file, &plan));
@@ -505,7 +506,7 @@ fn gcode_ink_with_arcs() {
 
 #[test]
 fn gcode_timed_ink_and_duration() {
-    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    let ruler = ruler(Cartesian);
     for machine in ["cartesian", "coaxial", "polar"] {
         let file = DRAWINGS[0];
         let plan = plan(file, machine, &[]);
@@ -615,7 +616,7 @@ fn sampled(samples: impl Iterator<Item = (u16, Point)>) -> Lines {
 
 #[test]
 fn joint_trajectory_quintic_ink() {
-    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    let ruler = ruler(Cartesian);
     for name in ["coaxial", "polar", "corexy"] {
         let machine = preset(name);
         let plan = plan(DRAWINGS[0], name, &[]);
@@ -625,7 +626,10 @@ fn joint_trajectory_quintic_ink() {
         assert_eq!(document["joint_names"][2], "pen");
         let points = document["points"].as_array().expect("points");
         assert_eq!(points.len(), plan.rows.len());
-        let unit = machine.geometry().joint_is_angle().map(|angle| if angle { 1.0 } else { 1000.0 });
+        let unit = machine
+            .mechanism()
+            .joint_kinds()
+            .map(|kind| if kind == JointKind::Revolute { 1.0 } else { 1000.0 });
         let value = |point: &Value, what: &str, joint: usize| point[what][joint].as_f64().expect("a number");
         let time = |point: &Value| {
             let time = &point["time_from_start"];
@@ -654,7 +658,7 @@ fn joint_trajectory_quintic_ink() {
                     let c5 = 6.0 * (p1 - p0) - 3.0 * (v0 + v1) - 0.5 * (a0 - a1);
                     p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
                 });
-                let at = machine.geometry().forward(&JointPos::from(joints));
+                let at = machine.mechanism().forward(&JointPos::from(joints));
                 samples.push((pen, [at.x, at.y]));
             }
         }
@@ -668,7 +672,7 @@ fn joint_trajectory_quintic_ink() {
 
 #[test]
 fn halstreamer_and_pvt_ink() {
-    let ruler = ruler(Geometry::Cartesian(Cartesian));
+    let ruler = ruler(Cartesian);
     for name in ["coaxial", "hbot", "polar"] {
         let machine = preset(name);
         let at = |ticks: Point| {

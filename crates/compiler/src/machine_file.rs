@@ -3,10 +3,13 @@
 //! The form is documented in docs/machine-files.md. Values carry their units as text and keep it, so that a file that was
 //! read can be written into a plan document and read back without a digit's change.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use drawing::Rect;
+use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
 use kinematics::{
-    Cartesian, Geometry, Joint, JointPos, Machine, MachineError, MachineParts, Motor, PenLimits, Polar,
-    TwoLink,
+    JointKind, JointPos, JointRange, Machine, MachineError, MachineParts, Mechanism, Motor, PenLimits,
 };
 use serde::{Deserialize, Serialize};
 
@@ -58,94 +61,52 @@ pub const PRESETS: [Preset; 5] = [
 pub struct MachineFile {
     name: String,
     geometry: GeometryTable,
-    #[serde(default, skip_serializing_if = "JointsTable::is_empty")]
-    joints: JointsTable,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    joints: PerJoint<Range>,
     #[serde(default)]
     coupling: CouplingTable,
     motor: Vec<MotorTable>,
     pen: PenTable,
     sheet: SheetTable,
-    start: StartTable,
+    start: PerJoint<String>,
     #[serde(default)]
     plan: PlanTable,
 }
 
+/// The `[geometry]` table: the kind of mechanism and its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-enum GeometryTable {
-    Cartesian {},
-    TwoLink {
-        l1: String,
-        l2: String,
-        elbow: Elbow,
-        #[serde(default = "default_min_dexterity")]
-        min_dexterity: f64,
-    },
-    Polar {},
+#[serde(try_from = "BTreeMap<String, Parameter>", into = "BTreeMap<String, Parameter>")]
+struct GeometryTable {
+    kind: Kind,
+    /// What the table holds, `kind` included.
+    table: BTreeMap<String, Parameter>,
 }
 
-/// Arms are kept away from poses where a joint would turn ten times as fast as it need elsewhere, the polar pen a
-/// millimetre from the pole.
-fn default_min_dexterity() -> f64 {
-    0.1
+/// A value in the `[geometry]` table: a number, or text, which may have a unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a number, or text such as \"206mm\"")]
+enum Parameter {
+    Number(f64),
+    Text(String),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Elbow {
-    Left,
-    Right,
-}
+/// Values by the names of joints.
+type PerJoint<T> = BTreeMap<String, T>;
 
-/// A value for each joint that the geometry has; those of other geometries stay empty.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PerJoint<T> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    x: Option<T>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    y: Option<T>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    theta: Option<T>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    psi: Option<T>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    phi: Option<T>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    r: Option<T>,
-}
-
-type JointsTable = PerJoint<Range>;
-type StartTable = PerJoint<String>;
-
-impl<T> PerJoint<T> {
-    fn is_empty(&self) -> bool {
-        self.named().iter().all(|(_, value)| value.is_none())
+/// The values of the mechanism's two joints in a table of the file.
+fn per_joint<'a, T>(
+    values: &'a PerJoint<T>,
+    table: &str,
+    mechanism: &dyn Mechanism,
+) -> Result<[Option<&'a T>; 2], MachineFileError> {
+    let names = mechanism.joint_names();
+    if let Some(name) = values.keys().find(|name| !names.contains(&name.as_str())) {
+        return Err(MachineFileError::Invalid(format!(
+            "[{table}] names the joint {name}, but this geometry has {} and {}",
+            names[0], names[1]
+        )));
     }
-
-    fn named(&self) -> [(&'static str, Option<&T>); 6] {
-        [
-            ("x", self.x.as_ref()),
-            ("y", self.y.as_ref()),
-            ("theta", self.theta.as_ref()),
-            ("psi", self.psi.as_ref()),
-            ("phi", self.phi.as_ref()),
-            ("r", self.r.as_ref()),
-        ]
-    }
-
-    /// The values of the geometry's two joints.
-    fn of(&self, table: &str, geometry: &Geometry) -> Result<[Option<&T>; 2], MachineFileError> {
-        let names = geometry.joint_names();
-        let named = self.named();
-        if let Some((name, _)) = named.iter().find(|(name, value)| value.is_some() && !names.contains(name)) {
-            return Err(MachineFileError::Invalid(format!(
-                "[{table}] names the joint {name}, but this geometry has {} and {}",
-                names[0], names[1]
-            )));
-        }
-        Ok(names.map(|wanted| named.iter().find(|(name, _)| *name == wanted).and_then(|(_, value)| *value)))
-    }
+    Ok(names.map(|name| values.get(name)))
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -237,6 +198,9 @@ pub enum MachineFileError {
         /// What is wrong with it.
         source: QuantityError,
     },
+    /// A parameter of the geometry cannot be read.
+    #[error("geometry.{0}")]
+    Geometry(ParameterError),
     /// The parts do not make a machine.
     #[error(transparent)]
     Machine(#[from] MachineError),
@@ -262,26 +226,28 @@ impl MachineFile {
     /// # Errors
     /// When a value is not of the unit that its key wants, or the parts do not make a machine.
     pub fn machine(&self) -> Result<Machine, MachineFileError> {
-        let geometry = self.geometry()?;
-        let dimensions =
-            geometry.joint_is_angle().map(|angle| if angle { Dimension::Angle } else { Dimension::Length });
-        let names = geometry.joint_names();
+        let mechanism = self.geometry.mechanism().map_err(MachineFileError::Geometry)?;
+        let dimensions = mechanism.joint_kinds().map(|kind| match kind {
+            JointKind::Revolute => Dimension::Angle,
+            JointKind::Prismatic => Dimension::Length,
+        });
+        let names = mechanism.joint_names();
         let at = |key: String| move |source| MachineFileError::Quantity { key, source };
 
-        let mut joints = [Joint::FREE; 2];
-        for (k, range) in self.joints.of("joints", &geometry)?.into_iter().enumerate() {
+        let mut joints = [JointRange::FREE; 2];
+        for (k, range) in per_joint(&self.joints, "joints", &*mechanism)?.into_iter().enumerate() {
             let Some(range) = range else { continue };
             let value = |text: &Option<String>, which: &str, otherwise: f64| match text {
                 Some(text) => dimensions[k].value(text).map_err(at(format!("joints.{}.{which}", names[k]))),
                 None => Ok(otherwise),
             };
-            joints[k] = Joint {
+            joints[k] = JointRange {
                 min: value(&range.min, "min", f64::NEG_INFINITY)?,
                 max: value(&range.max, "max", f64::INFINITY)?,
             };
         }
         let mut start = JointPos::ZERO;
-        for (k, value) in self.start.of("start", &geometry)?.into_iter().enumerate() {
+        for (k, value) in per_joint(&self.start, "start", &*mechanism)?.into_iter().enumerate() {
             let text = value.ok_or_else(|| {
                 MachineFileError::Invalid(format!("[start] does not say where joint {} is", names[k]))
             })?;
@@ -298,16 +264,14 @@ impl MachineFile {
         let (x, y) = (length(&self.sheet.x, "sheet.x")?, length(&self.sheet.y, "sheet.y")?);
         let (width, height) =
             (length(&self.sheet.width, "sheet.width")?, length(&self.sheet.height, "sheet.height")?);
-        let min_dexterity = match self.geometry {
-            GeometryTable::TwoLink { min_dexterity, .. } => min_dexterity,
-            GeometryTable::Polar {} => default_min_dexterity(),
-            GeometryTable::Cartesian {} => 0.0,
-        };
         Ok(Machine::new(MachineParts {
             name: self.name.clone(),
-            geometry,
             joints,
-            min_manipulability: min_dexterity,
+            min_manipulability: match self.geometry.table.get(MIN_MANIPULABILITY) {
+                Some(Parameter::Number(least)) => *least,
+                _ => mechanism.default_min_manipulability(),
+            },
+            mechanism,
             coupling: self.coupling.matrix,
             motors: [first.motor()?, second.motor()?],
             pen: PenLimits {
@@ -325,21 +289,84 @@ impl MachineFile {
             period_s: time(&self.plan.period, "plan.period")?,
         })?)
     }
+}
 
-    fn geometry(&self) -> Result<Geometry, MachineFileError> {
-        let length = |text: &str, key: &str| {
-            quantity::length_mm(text, false)
-                .map_err(|source| MachineFileError::Quantity { key: format!("geometry.{key}"), source })
+/// A key of every `[geometry]` table: [`MachineParts::min_manipulability`].
+const MIN_MANIPULABILITY: &str = "min_dexterity";
+
+impl GeometryTable {
+    fn mechanism(&self) -> Result<Arc<dyn Mechanism>, ParameterError> {
+        self.kind.mechanism(&mut TableReader(&self.table))
+    }
+}
+
+impl TryFrom<BTreeMap<String, Parameter>> for GeometryTable {
+    type Error = String;
+
+    /// Checks the keys. Values with units are read when the machine is made, where an error names its key.
+    fn try_from(table: BTreeMap<String, Parameter>) -> Result<Self, String> {
+        let listed =
+            |names: &[&str]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let name = match table.get("kind") {
+            Some(Parameter::Text(name)) => name,
+            Some(Parameter::Number(_)) => return Err("`kind` must be text".into()),
+            None => return Err("missing field `kind`".into()),
         };
-        Ok(match &self.geometry {
-            GeometryTable::Cartesian {} => Geometry::Cartesian(Cartesian),
-            GeometryTable::Polar {} => Geometry::Polar(Polar),
-            GeometryTable::TwoLink { l1, l2, elbow, .. } => Geometry::TwoLink(TwoLink {
-                l1: length(l1, "l1")?,
-                l2: length(l2, "l2")?,
-                elbow_left: *elbow == Elbow::Left,
-            }),
-        })
+        let kind = *KINDS.iter().find(|kind| kind.name == name).ok_or_else(|| {
+            let names: Vec<_> = KINDS.iter().map(|kind| kind.name).collect();
+            format!("unknown variant `{name}`, expected one of {}", listed(&names))
+        })?;
+        let known = [&["kind"], kind.parameters, &[MIN_MANIPULABILITY]].concat();
+        if let Some(key) = table.keys().find(|key| !known.contains(&key.as_str())) {
+            return Err(format!("unknown field `{key}`, expected one of {}", listed(&known)));
+        }
+        if let Some(Parameter::Text(_)) = table.get(MIN_MANIPULABILITY) {
+            return Err(format!("`{MIN_MANIPULABILITY}` must be a number"));
+        }
+        let geometry = Self { kind, table };
+        match geometry.mechanism() {
+            Ok(_) | Err(ParameterError::Unreadable { .. }) => Ok(geometry),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+}
+
+impl From<GeometryTable> for BTreeMap<String, Parameter> {
+    fn from(geometry: GeometryTable) -> Self {
+        geometry.table
+    }
+}
+
+/// Reads a mechanism's parameters from a `[geometry]` table.
+struct TableReader<'a>(&'a BTreeMap<String, Parameter>);
+
+impl TableReader<'_> {
+    fn text(&self, key: &'static str) -> Result<&str, ParameterError> {
+        match self.0.get(key) {
+            Some(Parameter::Text(text)) => Ok(text),
+            Some(Parameter::Number(number)) => {
+                let reason = format!("{number} must be text in quotes");
+                Err(ParameterError::Unreadable { key, reason })
+            }
+            None => Err(ParameterError::Missing { key }),
+        }
+    }
+}
+
+impl Parameters for TableReader<'_> {
+    fn length_mm(&mut self, key: &'static str) -> Result<f64, ParameterError> {
+        let unreadable = |error: QuantityError| ParameterError::Unreadable { key, reason: error.to_string() };
+        quantity::length_mm(self.text(key)?, false).map_err(unreadable)
+    }
+
+    fn choice(
+        &mut self,
+        key: &'static str,
+        choices: &'static [&'static str],
+    ) -> Result<usize, ParameterError> {
+        let value = self.text(key)?;
+        let found = choices.iter().position(|choice| *choice == value);
+        found.ok_or_else(|| ParameterError::NotAChoice { key, value: value.to_owned(), choices })
     }
 }
 
@@ -398,7 +425,9 @@ mod tests {
             let file = MachineFile::parse(preset.toml).unwrap();
             let json = serde_json::to_value(&file).unwrap();
             let back: MachineFile = serde_json::from_value(json).unwrap();
-            assert_eq!(back.machine().unwrap(), file.machine().unwrap());
+            // Debug writes every digit of a number.
+            let parts = |file: &MachineFile| format!("{:?}", file.machine().unwrap().parts());
+            assert_eq!(parts(&back), parts(&file));
         }
     }
 

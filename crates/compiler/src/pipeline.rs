@@ -158,7 +158,7 @@ pub fn compile<'a>(
         Order::File => (placed.clone(), None),
         Order::Optimize(options) => {
             progress(Step::Ordering);
-            let start = machine.geometry().forward(&machine.start());
+            let start = machine.mechanism().forward(&machine.start());
             let options = ordering::Options { start: Some(start), park: Some(start), ..options.clone() };
             let (ordered, report) = ordering::optimize(placed.clone(), &TravelTime(machine), &options);
             (ordered, Some(report))

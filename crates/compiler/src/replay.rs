@@ -60,7 +60,7 @@ impl Motion {
 /// The pen's path while the motors move linearly between two rows.
 fn chords(machine: &Machine, from: MotorPos, to: MotorPos, chord_mm: f64) -> Vec<Point> {
     let bend = machine
-        .geometry()
+        .mechanism()
         .second_derivative_bound(&machine.joint_positions(&from), &machine.joint_positions(&to));
     let pieces = (bend / (8.0 * chord_mm)).sqrt().ceil().clamp(1.0, 1000.0) as usize;
     (0..=pieces)

@@ -35,7 +35,7 @@ pub fn of_plan(title: &str, rows: &[Row], machine: &Machine) -> Scene {
 }
 
 fn start_point(machine: &Machine) -> Point {
-    machine.geometry().forward(&machine.start())
+    machine.mechanism().forward(&machine.start())
 }
 
 fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, start: Option<Point>) -> Scene {

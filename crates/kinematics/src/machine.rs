@@ -1,32 +1,34 @@
-//! A whole machine: geometry, coupling, motors, limits, pen and sheet.
+//! A whole machine: mechanism, coupling, motors, limits, pen and sheet.
+
+use std::sync::Arc;
 
 use drawing::{Point, Rect, Vec2};
 use nalgebra::Matrix2;
 
-use crate::{
-    Coupling, Fault, Geometry, JointPos, MotorPos, SingularCoupling, Unreachable, reach::CHORD_TOLERANCE,
-};
+use crate::reach::CHORD_TOLERANCE;
+use crate::{Coupling, Fault, JointKind, JointPos, Mechanism, MotorPos, SingularCoupling, Unreachable};
 
 /// The allowed range of one joint, rad or mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Joint {
+pub struct JointRange {
     /// Smallest allowed value.
     pub min: f64,
     /// Largest allowed value.
     pub max: f64,
 }
 
-impl Joint {
-    /// A joint that may go anywhere.
+impl JointRange {
+    /// A joint without limits.
     pub const FREE: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY };
 }
 
 /// One motor with its limits, in ticks: the smallest unit in which it is commanded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motor {
-    /// Heads the motor's column in a plan.
+    /// The name; the heading of the motor's column in a plan.
     pub name: String,
-    /// Ticks per unit (rad or mm) of this motor's row of `C q`; negative for a motor that counts the other way.
+    /// Ticks per unit (rad or mm) of this motor's row of `C q`; negative for a motor that counts the
+    /// other way.
     pub ticks_per_unit: f64,
     /// Ticks where that row is 0.
     pub offset_ticks: f64,
@@ -34,78 +36,222 @@ pub struct Motor {
     pub max_speed_ticks_s: f64,
     /// Largest acceleration, ticks/s².
     pub max_acceleration_ticks_s2: f64,
-    /// Largest jerk, ticks/s³, where the machine states one.
+    /// Largest jerk, ticks/s³; `None` for a machine without a jerk limit.
     pub max_jerk_ticks_s3: Option<f64>,
 }
 
-/// What the pen itself allows.
+impl Motor {
+    /// A motor with offset 0, no jerk limit, and these limits in units (rad or mm) of its row of
+    /// `C q`: units/s and units/s².
+    pub fn new(
+        name: impl Into<String>,
+        ticks_per_unit: f64,
+        max_speed_per_s: f64,
+        max_acceleration_per_s2: f64,
+    ) -> Self {
+        let scale = ticks_per_unit.abs();
+        Self {
+            name: name.into(),
+            ticks_per_unit,
+            offset_ticks: 0.0,
+            max_speed_ticks_s: scale * max_speed_per_s,
+            max_acceleration_ticks_s2: scale * max_acceleration_per_s2,
+            max_jerk_ticks_s3: None,
+        }
+    }
+}
+
+/// The limits of the pen and its lift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PenLimits {
     /// Largest speed of the pen over the paper while it draws, mm/s.
     pub max_speed_mm_s: f64,
     /// Largest speed of the pen while it travels, mm/s; infinite where only the motors limit it.
     pub max_travel_speed_mm_s: f64,
-    /// How long lifting takes, s: the motors stand still.
+    /// Duration of lifting, s; the motors are at rest.
     pub lift_time_s: f64,
-    /// How long lowering takes, s: the motors stand still.
+    /// Duration of lowering, s; the motors are at rest.
     pub drop_time_s: f64,
 }
 
-/// What a machine is made of, before it was checked.
-#[derive(Clone, Debug, PartialEq)]
+impl Default for PenLimits {
+    /// 60 mm/s while drawing, no limit while travelling, 150 ms to lift and to lower.
+    fn default() -> Self {
+        Self {
+            max_speed_mm_s: 60.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.15,
+            drop_time_s: 0.15,
+        }
+    }
+}
+
+/// Unvalidated parameters of a machine. [`MachineParts::new`] sets what a machine file may leave out.
+#[derive(Clone, Debug)]
 pub struct MachineParts {
     /// Name of the machine.
     pub name: String,
-    /// Its shape.
-    pub geometry: Geometry,
+    /// The mechanism.
+    pub mechanism: Arc<dyn Mechanism>,
     /// Allowed ranges of the joints.
-    pub joints: [Joint; 2],
-    /// No pen-down pose may have a smaller [`Geometry::manipulability`].
+    pub joints: [JointRange; 2],
+    /// No pen-down pose may have a smaller [`Mechanism::manipulability`].
     pub min_manipulability: f64,
-    /// Rows of the coupling matrix, one a motor.
+    /// The rows of the coupling matrix, one per motor.
     pub coupling: [[f64; 2]; 2],
     /// The motors.
     pub motors: [Motor; 2],
     /// The pen.
     pub pen: PenLimits,
-    /// The sheet in machine mm; its lower-left corner is the drawing's (0, 0) unless told otherwise.
+    /// The sheet, machine mm. Its lower-left corner is the drawing's origin by default.
     pub sheet: Rect,
-    /// The pose in which every plan starts, and ends unless told otherwise.
+    /// The pose in which every plan starts; by default plans end there too.
     pub start: JointPos,
-    /// Time between the rows of a plan, s, unless told otherwise.
+    /// Default time between the rows of a plan, s.
     pub period_s: f64,
 }
 
-/// Why a machine cannot be.
+impl MachineParts {
+    /// A machine with free joints, motors coupled one to one with the joints, the default pen
+    /// ([`PenLimits::default`]), rows every 10 ms, and plans that start over the centre of the sheet
+    /// (in the pose 0, 0 where the centre is out of reach).
+    pub fn new(
+        name: impl Into<String>,
+        mechanism: impl Mechanism + 'static,
+        motors: [Motor; 2],
+        sheet: Rect,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            joints: [JointRange::FREE; 2],
+            min_manipulability: mechanism.default_min_manipulability(),
+            coupling: [[1.0, 0.0], [0.0, 1.0]],
+            motors,
+            pen: PenLimits::default(),
+            sheet,
+            start: mechanism.inverse(sheet.center()).unwrap_or_default(),
+            period_s: 0.01,
+            mechanism: Arc::new(mechanism),
+        }
+    }
+}
+
+/// Invalid machine description.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MachineError {
     /// See [`SingularCoupling`].
     #[error(transparent)]
     Coupling(#[from] SingularCoupling),
     /// A quantity that must be a positive number is not.
-    #[error("{what} must be a positive number, not {value}")]
+    #[error("{quantity} must be a positive number, not {value}")]
     NotPositive {
-        /// What the quantity is.
-        what: String,
-        /// What it was.
+        /// Which quantity.
+        quantity: Quantity,
+        /// Its value.
         value: f64,
     },
-    /// A quantity is not a finite number, or a range is turned inside out.
-    #[error("{what}")]
-    Invalid {
-        /// What is wrong with what.
-        what: String,
+    /// A quantity is not within its range.
+    #[error("{quantity} must be from {min} to {max}{unit}, not {value}", unit = if unit.is_empty() { String::new() } else { format!(" {unit}") })]
+    OutOfRange {
+        /// Which quantity.
+        quantity: Quantity,
+        /// Its value.
+        value: f64,
+        /// The smallest allowed value.
+        min: f64,
+        /// The largest allowed value.
+        max: f64,
+        /// The unit of the three; empty for a pure number.
+        unit: &'static str,
     },
-    /// A joint of the start pose is outside its own range.
+    /// The smallest allowed manipulability is not from 0 to below 1.
+    #[error("min_dexterity must be at least 0 and below 1, not {value}")]
+    MinManipulability {
+        /// Its value.
+        value: f64,
+    },
+    /// A quantity is infinite or NaN.
+    #[error("{quantity} must be finite")]
+    NotFinite {
+        /// Which quantity.
+        quantity: Quantity,
+    },
+    /// The smallest allowed value of a joint is not below the largest.
+    #[error("joint {joint}: min must be below max")]
+    EmptyJointRange {
+        /// The joint's name.
+        joint: &'static str,
+    },
+    /// The sheet has no area.
+    #[error("the sheet must have a positive width and height")]
+    EmptySheet,
+    /// A motor has no name.
+    #[error("a motor has no name")]
+    UnnamedMotor,
+    /// Both motors have the same name.
+    #[error("both motors are named {name}")]
+    DuplicateMotorName {
+        /// The name.
+        name: String,
+    },
+    /// A joint of the start pose is outside its range.
     #[error("the start pose is not allowed: {fault}")]
     Start {
-        /// Why.
+        /// Which joint, and its range.
         fault: Fault,
     },
 }
 
-/// A machine that holds together: invertible coupling, positive limits, a start pose inside its joint limits.
-#[derive(Clone, Debug, PartialEq)]
+/// Which quantity of a machine description an error is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Quantity {
+    /// Its name, as machine files have it.
+    pub name: &'static str,
+    /// The name of the motor that it belongs to, if it belongs to one.
+    pub motor: Option<String>,
+}
+
+impl std::fmt::Display for Quantity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.motor {
+            Some(motor) => write!(f, "{} of motor {motor}", self.name),
+            None => f.write_str(self.name),
+        }
+    }
+}
+
+impl From<&'static str> for Quantity {
+    fn from(name: &'static str) -> Self {
+        Self { name, motor: None }
+    }
+}
+
+impl MachineError {
+    /// An error unless the value is a positive finite number.
+    pub(crate) fn require_positive(quantity: impl Into<Quantity>, value: f64) -> Result<(), Self> {
+        if value > 0.0 && value.is_finite() {
+            return Ok(());
+        }
+        Err(Self::NotPositive { quantity: quantity.into(), value })
+    }
+
+    /// An error unless the value is from `min` to `max`.
+    fn require_range(
+        quantity: &'static str,
+        value: f64,
+        (min, max): (f64, f64),
+        unit: &'static str,
+    ) -> Result<(), Self> {
+        if (min..=max).contains(&value) {
+            return Ok(());
+        }
+        Err(Self::OutOfRange { quantity: quantity.into(), value, min, max, unit })
+    }
+}
+
+/// A validated machine: invertible coupling, positive limits, a start pose within the joint limits.
+#[derive(Clone, Debug)]
 pub struct Machine {
     parts: MachineParts,
     coupling: Coupling,
@@ -115,64 +261,82 @@ pub struct Machine {
     offset: MotorPos,
 }
 
+impl Motor {
+    fn validate(&self) -> Result<(), MachineError> {
+        if self.name.is_empty() {
+            return Err(MachineError::UnnamedMotor);
+        }
+        let of = |name: &'static str| Quantity { name, motor: Some(self.name.clone()) };
+        MachineError::require_positive(of("the size of counts"), self.ticks_per_unit.abs())?;
+        MachineError::require_positive(of("max_speed"), self.max_speed_ticks_s)?;
+        MachineError::require_positive(of("max_acceleration"), self.max_acceleration_ticks_s2)?;
+        if let Some(jerk) = self.max_jerk_ticks_s3 {
+            MachineError::require_positive(of("max_jerk"), jerk)?;
+        }
+        if !self.offset_ticks.is_finite() {
+            return Err(MachineError::NotFinite { quantity: of("offset") });
+        }
+        Ok(())
+    }
+}
+
+impl PenLimits {
+    fn validate(&self) -> Result<(), MachineError> {
+        MachineError::require_positive("the pen's max_speed", self.max_speed_mm_s)?;
+        let travel = self.max_travel_speed_mm_s;
+        if travel.is_nan() || travel <= 0.0 {
+            let quantity = "the pen's max_travel_speed".into();
+            return Err(MachineError::NotPositive { quantity, value: travel });
+        }
+        MachineError::require_range("the pen's lift_time", self.lift_time_s, (0.0, 3600.0), "s")?;
+        MachineError::require_range("the pen's drop_time", self.drop_time_s, (0.0, 3600.0), "s")
+    }
+}
+
+impl MachineParts {
+    fn validate(&self) -> Result<(), MachineError> {
+        self.mechanism.validate()?;
+        for motor in &self.motors {
+            motor.validate()?;
+        }
+        if self.motors[0].name == self.motors[1].name {
+            return Err(MachineError::DuplicateMotorName { name: self.motors[0].name.clone() });
+        }
+        self.pen.validate()?;
+        MachineError::require_range("period", self.period_s, (1e-6, 10.0), "s")?;
+        let sheet = self.sheet;
+        if !(sheet.is_finite() && sheet.width() > 0.0 && sheet.height() > 0.0) {
+            return Err(MachineError::EmptySheet);
+        }
+        if !(0.0..1.0).contains(&self.min_manipulability) {
+            return Err(MachineError::MinManipulability { value: self.min_manipulability });
+        }
+        for (range, joint) in self.joints.iter().zip(self.mechanism.joint_names()) {
+            // NaN is no limit either.
+            let ordered = range.min < range.max;
+            if !ordered {
+                return Err(MachineError::EmptyJointRange { joint });
+            }
+        }
+        if !self.start.is_finite() {
+            return Err(MachineError::NotFinite { quantity: "the start pose".into() });
+        }
+        Ok(())
+    }
+}
+
 impl Machine {
-    /// Checks the parts and puts them together.
+    /// Validates the parts and assembles the machine.
     ///
     /// # Errors
-    /// When the coupling is singular, or a limit, length or time is not a positive finite number, or the start pose
-    /// is outside the joint limits.
+    /// When the coupling is singular, a limit, length or time is not a positive finite number, or
+    /// the start pose is outside the joint limits.
     pub fn new(parts: MachineParts) -> Result<Self, MachineError> {
-        let positive = |what: &str, value: f64| {
-            (value > 0.0 && value.is_finite())
-                .then_some(())
-                .ok_or_else(|| MachineError::NotPositive { what: what.into(), value })
-        };
-        let require = |holds: bool, what: &str| {
-            holds.then_some(()).ok_or_else(|| MachineError::Invalid { what: what.into() })
-        };
-        if let Geometry::TwoLink(arm) = parts.geometry {
-            positive("l1", arm.l1)?;
-            positive("l2", arm.l2)?;
-        }
-        for motor in &parts.motors {
-            let of = |what: &str| format!("{what} of motor {}", motor.name);
-            require(!motor.name.is_empty(), "a motor has no name")?;
-            positive(&of("the size of counts"), motor.ticks_per_unit.abs())?;
-            positive(&of("max_speed"), motor.max_speed_ticks_s)?;
-            positive(&of("max_acceleration"), motor.max_acceleration_ticks_s2)?;
-            if let Some(jerk) = motor.max_jerk_ticks_s3 {
-                positive(&of("max_jerk"), jerk)?;
-            }
-            require(motor.offset_ticks.is_finite(), &of("offset must be finite"))?;
-        }
-        require(parts.motors[0].name != parts.motors[1].name, "both motors have the same name")?;
-        positive("the pen's max_speed", parts.pen.max_speed_mm_s)?;
-        let travel = parts.pen.max_travel_speed_mm_s;
-        require(travel > 0.0, "the pen's max_travel_speed must be a positive number")?;
-        for (what, time) in [("lift_time", parts.pen.lift_time_s), ("drop_time", parts.pen.drop_time_s)] {
-            require(
-                (0.0..=3600.0).contains(&time),
-                &format!("the pen's {what} must be between 0 and 3600 s"),
-            )?;
-        }
-        positive("period", parts.period_s)?;
-        require((1e-6..=10.0).contains(&parts.period_s), "period must be between 1 us and 10 s")?;
-        require(
-            parts.sheet.is_finite() && parts.sheet.width() > 0.0 && parts.sheet.height() > 0.0,
-            "the sheet must have a positive width and height",
-        )?;
-        require(
-            (0.0..1.0).contains(&parts.min_manipulability),
-            "the smallest dexterity must be from 0 to below 1",
-        )?;
-        for (joint, name) in parts.joints.iter().zip(parts.geometry.joint_names()) {
-            require(joint.min < joint.max, &format!("joint {name}: min must be below max"))?;
-        }
+        parts.validate()?;
         let coupling = Coupling::from_rows(parts.coupling)?;
         let (to_ticks, from_ticks) =
             coupling.scaled(parts.motors.each_ref().map(|motor| motor.ticks_per_unit));
         let offset = MotorPos(parts.motors.each_ref().map(|motor| motor.offset_ticks));
-        require(parts.start.is_finite(), "the start pose must be finite")?;
         let machine = Self { parts, coupling, to_ticks, from_ticks, offset };
         match machine.joint_fault(&machine.parts.start) {
             Some(fault) => Err(MachineError::Start { fault }),
@@ -190,9 +354,9 @@ impl Machine {
         &self.parts.name
     }
 
-    /// Its shape.
-    pub fn geometry(&self) -> &Geometry {
-        &self.parts.geometry
+    /// Its mechanism.
+    pub fn mechanism(&self) -> &dyn Mechanism {
+        &*self.parts.mechanism
     }
 
     /// Its coupling.
@@ -242,7 +406,7 @@ impl Machine {
 
     /// Where the pen is when the motors are at `motors`, mm.
     pub fn forward_from_motors(&self, motors: &MotorPos) -> Point {
-        self.parts.geometry.forward(&self.joint_positions(motors))
+        self.parts.mechanism.forward(&self.joint_positions(motors))
     }
 
     /// The pose for the point `p`, unwrapped: of all whole turns about the base the one nearest to `near`. Joint limits
@@ -251,8 +415,8 @@ impl Machine {
     /// # Errors
     /// When no pose reaches the point.
     pub fn pose_near(&self, p: Point, near: &JointPos) -> Result<JointPos, Unreachable> {
-        let q = self.parts.geometry.inverse(p)?;
-        Ok(match self.parts.geometry.full_rotation() {
+        let q = self.parts.mechanism.inverse(p)?;
+        Ok(match self.parts.mechanism.full_rotation() {
             // The first joint is one that turns.
             Some(rotation) => q + rotation * ((near[0] - q[0]) / rotation[0]).round(),
             None => q,
@@ -267,10 +431,13 @@ impl Machine {
         let nearest = self.pose_near(p, near)?;
         let mut allowed = Vec::new();
         let mut fault = None;
-        let turns: &[f64] =
-            if self.parts.geometry.full_rotation().is_some() { &[0.0, -1.0, 1.0, -2.0, 2.0] } else { &[0.0] };
+        let turns: &[f64] = if self.parts.mechanism.full_rotation().is_some() {
+            &[0.0, -1.0, 1.0, -2.0, 2.0]
+        } else {
+            &[0.0]
+        };
         for extra in turns {
-            let candidate = nearest + self.parts.geometry.full_rotation().unwrap_or_default() * *extra;
+            let candidate = nearest + self.parts.mechanism.full_rotation().unwrap_or_default() * *extra;
             match self.joint_fault(&candidate) {
                 None => allowed.push(candidate),
                 Some(found) => fault = fault.or(Some(found)),
@@ -285,23 +452,23 @@ impl Machine {
     /// First and second derivative of the motors' positions (ticks) along a path on which the pen, at pose `q`, has
     /// the derivatives `first` and `second`.
     pub fn motor_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (MotorPos, MotorPos) {
-        let (q_1, q_2) = self.parts.geometry.path_derivatives(q, first, second);
+        let (q_1, q_2) = self.parts.mechanism.path_derivatives(q, first, second);
         (self.motor_rates(&q_1), self.motor_rates(&q_2))
     }
 
     /// Third derivative of the motors' positions (ticks) along such a path, on which the pen also has the derivative `third`.
     pub fn motor_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> MotorPos {
-        self.motor_rates(&self.parts.geometry.path_third_derivative(q, first, second, third))
+        self.motor_rates(&self.parts.mechanism.path_third_derivative(q, first, second, third))
     }
 
     /// How far the pen can be from where it should be because motors only take whole ticks: the largest displacement
     /// over half a tick more or less on both motors, mm.
     pub fn quantization_error(&self, q: &JointPos) -> f64 {
-        let exact = self.parts.geometry.forward(q);
+        let exact = self.parts.mechanism.forward(q);
         [(0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)]
             .into_iter()
             .map(|(a, b)| {
-                let moved = self.parts.geometry.forward(&(*q + self.joint_rates(&MotorPos::new(a, b))));
+                let moved = self.parts.mechanism.forward(&(*q + self.joint_rates(&MotorPos::new(a, b))));
                 libm::hypot(moved.x - exact.x, moved.y - exact.y)
             })
             .fold(0.0, f64::max)
@@ -315,21 +482,21 @@ impl Machine {
     /// The same for points between those that [`Self::check_segment`] looked at: curves are checked as chords, so a joint
     /// may exceed its range there by what a curve leaves its chord by, seen from no nearer than 10 mm.
     pub fn joint_fault_between(&self, q: &JointPos) -> Option<Fault> {
-        let angles = self.parts.geometry.joint_is_angle();
-        self.joint_fault_beyond(
-            q,
-            angles.map(|angle| if angle { CHORD_TOLERANCE / 10.0 } else { CHORD_TOLERANCE }),
-        )
+        let slack = |kind| match kind {
+            JointKind::Revolute => CHORD_TOLERANCE / 10.0,
+            JointKind::Prismatic => CHORD_TOLERANCE,
+        };
+        self.joint_fault_beyond(q, self.parts.mechanism.joint_kinds().map(slack))
     }
 
     fn joint_fault_beyond(&self, q: &JointPos, slack: [f64; 2]) -> Option<Fault> {
-        let names = self.parts.geometry.joint_names();
+        let names = self.parts.mechanism.joint_names();
         (0..2).find_map(|index| {
             let (joint, value) = (self.parts.joints[index], q[index]);
             let allowed = value >= joint.min - slack[index] && value <= joint.max + slack[index];
             (!allowed).then(|| Fault::JointLimit {
                 joint: names[index],
-                angle: self.parts.geometry.joint_is_angle()[index],
+                kind: self.parts.mechanism.joint_kinds()[index],
                 value,
                 min: joint.min,
                 max: joint.max,

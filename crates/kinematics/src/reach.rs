@@ -2,7 +2,7 @@
 
 use drawing::{Line, Point, Segment};
 
-use crate::{Machine, Unreachable};
+use crate::{JointKind, JointPos, JointRange, Machine, Unreachable};
 
 /// Why the pen cannot draw at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,8 +15,8 @@ pub enum Fault {
     JointLimit {
         /// The joint's name.
         joint: &'static str,
-        /// Whether the values are angles (rad) rather than lengths (mm).
-        angle: bool,
+        /// Whether the values are rad or mm.
+        kind: JointKind,
         /// The value it would take.
         value: f64,
         /// Smallest allowed value.
@@ -26,7 +26,7 @@ pub enum Fault {
     },
     /// Too near to a pose in which the pen cannot move in every direction: a stretched or folded arm, the pole.
     Singular {
-        /// How far from singular the pose is, see [`crate::Geometry::manipulability`].
+        /// How far from singular the pose is, see [`crate::Mechanism::manipulability`].
         manipulability: f64,
         /// The least the machine allows.
         min: f64,
@@ -42,13 +42,18 @@ impl From<Unreachable> for Fault {
     }
 }
 
+impl std::error::Error for Fault {}
+
 impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
             Self::TooFar(by) => write!(f, "it is {by:.2} mm beyond the machine's reach"),
             Self::TooNear(by) => write!(f, "it is {by:.2} mm too near to the machine's base"),
-            Self::JointLimit { joint, angle, value, min, max } => {
-                let (scale, unit) = if angle { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, "mm") };
+            Self::JointLimit { joint, kind, value, min, max } => {
+                let (scale, unit) = match kind {
+                    JointKind::Revolute => (180.0 / std::f64::consts::PI, "deg"),
+                    JointKind::Prismatic => (1.0, "mm"),
+                };
                 let (value, min, max) = (value * scale, min * scale, max * scale);
                 write!(
                     f,
@@ -89,7 +94,7 @@ impl Machine {
             Ok(q) => {
                 let limit = self.joint_fault(&q).and_then(|_| self.poses(p, &self.start()).err());
                 let (manipulability, min) =
-                    (self.geometry().manipulability(&q), self.parts().min_manipulability);
+                    (self.mechanism().manipulability(&q), self.parts().min_manipulability);
                 limit.or_else(|| (manipulability < min).then_some(Fault::Singular { manipulability, min }))
             }
         };
@@ -98,13 +103,13 @@ impl Machine {
 
     /// Whether the pen may draw the whole segment, not only its ends.
     ///
-    /// On a straight line every condition is extreme at an end or at the foot of the perpendicular from the base: the
-    /// distance from the base (which alone decides the elbow's fold, so dexterity and reach) is convex along it, a
-    /// coordinate and the polar angle are monotone. The angles of an arm's links are not, so where those are limited
-    /// the line is also sampled every millimetre. Curves are taken as chords within 1e-3 mm.
+    /// On a straight line, the distance from the base (which alone decides the fold of an elbow, and so
+    /// reach and manipulability) is convex: it is extreme at an end or at the foot of the perpendicular
+    /// from the base. Joints are monotone between these points and those of
+    /// [`crate::Mechanism::joint_extrema_on_line`]. Curves are checked as chords within 1e-3 mm.
     ///
     /// # Errors
-    /// With the first offending point that was found.
+    /// With an offending point.
     pub fn check_segment(&self, segment: &Segment) -> Result<(), OutOfReach> {
         match segment {
             Segment::Line(line) => self.check_line(line),
@@ -126,19 +131,80 @@ impl Machine {
         self.check_point(line.p0)?;
         self.check_point(line.p1)?;
         let along = line.p1 - line.p0;
-        if let Some(base) = self.geometry().base() {
-            let t = (base - line.p0).dot(along) / along.hypot2();
-            if t > 0.0 && t < 1.0 {
-                self.check_point(line.p0 + t * along)?;
-            }
+        let foot = self.mechanism().base().map(|base| (base - line.p0).dot(along) / along.hypot2());
+        if let Some(t) = foot
+            && t > 0.0
+            && t < 1.0
+        {
+            self.check_point(at(line, t))?;
         }
-        let free = self.parts().joints.iter().all(|j| j.min == f64::NEG_INFINITY && j.max == f64::INFINITY);
-        if !free && matches!(self.geometry(), crate::Geometry::TwoLink(_)) {
-            let samples = along.hypot2().sqrt().ceil().min(1e5) as usize;
-            for k in 1..samples {
-                self.check_point(line.p0 + (k as f64 / samples as f64) * along)?;
-            }
+        if self.parts().joints.iter().all(|joint| *joint == JointRange::FREE) {
+            return Ok(());
+        }
+        let mut inner = self.mechanism().joint_extrema_on_line(line);
+        inner.retain(|t| *t > 0.0 && *t < 1.0 && self.pose_near(at(line, *t), &self.start()).is_ok());
+        for t in &inner {
+            self.check_point(at(line, *t))?;
+        }
+        if self.mechanism().full_rotation().is_none() {
+            return Ok(());
+        }
+        inner.extend(foot.filter(|t| *t > 0.0 && *t < 1.0));
+        inner.push(1.0);
+        inner.sort_unstable_by(f64::total_cmp);
+        let mut from = self.turns(line, 0.0, &self.start());
+        for t in inner {
+            let to = self.turns(line, t, &from.pose);
+            self.check_between(line, from, to)?;
+            from = to;
         }
         Ok(())
     }
+
+    /// Checks the joint limits between two points of a line between which the joints are monotone. Both
+    /// points have an allowed pose. If the same turn about the base is allowed at both, all poses
+    /// between are allowed; if not, the line may cross the gap that a joint range of less than a full
+    /// rotation leaves.
+    fn check_between(&self, line: &Line, from: Turns, to: Turns) -> Result<(), OutOfReach> {
+        if from.allowed & to.allowed != 0 || to.t - from.t < SMALLEST_GAP {
+            return Ok(());
+        }
+        let t = 0.5 * (from.t + to.t);
+        self.check_point(at(line, t))?;
+        let middle = self.turns(line, t, &from.pose);
+        self.check_between(line, from, middle)?;
+        self.check_between(line, middle, to)
+    }
+
+    /// The pose at a parameter of a line, continued from `near`, and the allowed turns.
+    fn turns(&self, line: &Line, t: f64, near: &JointPos) -> Turns {
+        let pose = self.pose_near(at(line, t), near).unwrap_or(*near);
+        let rotation = self.mechanism().full_rotation().unwrap_or_default();
+        let allowed = (0..=2 * MOST_TURNS)
+            .filter(|bit| self.joint_fault(&(pose + rotation * f64::from(bit - MOST_TURNS))).is_none())
+            .map(|bit| 1 << bit)
+            .sum();
+        Turns { t, pose, allowed }
+    }
+}
+
+/// The full rotations about the base that are tried on either side of a pose.
+const MOST_TURNS: i32 = 4;
+
+/// Gaps between allowed turns are looked for down to this share of a line.
+const SMALLEST_GAP: f64 = 1e-9;
+
+/// A pose on a line, and the full rotations by which it may be turned within the joint limits.
+#[derive(Clone, Copy)]
+struct Turns {
+    /// The line's parameter.
+    t: f64,
+    pose: JointPos,
+    /// Bit k: k - [`MOST_TURNS`] rotations.
+    allowed: u32,
+}
+
+/// The point of a line at the parameter `t`.
+fn at(line: &Line, t: f64) -> Point {
+    line.p0 + t * (line.p1 - line.p0)
 }

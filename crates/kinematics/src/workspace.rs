@@ -10,7 +10,7 @@ use crate::Machine;
 /// Along each ray from the base the reach is taken as one interval, found in steps of 1 mm up to
 /// 3 m and refined to 0.01 mm: for pictures, not for checks.
 pub fn reach_outlines(machine: &Machine) -> Vec<Vec<Point>> {
-    let Some(base) = machine.geometry().base() else {
+    let Some(base) = machine.mechanism().base() else {
         let joints = machine.parts().joints;
         let bed = Rect::new(joints[0].min, joints[1].min, joints[0].max, joints[1].max);
         if !bed.is_finite() {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use drawing::{Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
-use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
+use kinematics::{Cartesian, JointPos, JointRange, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::unstable::{CornerBlend, PathBudget, Section, sections};
 use planner::unstable::{GridInterval, JointPath, PathGeometry, SpeedCap, profile};
 use planner::{Settings, plan};
@@ -273,10 +273,10 @@ fn motor(name: &str, counts: f64, offset: f64, speed: f64, acceleration: f64) ->
 
 /// A CoreXY of 80 ticks/mm, belts of 141.42 mm/s and 1414.2 mm/s².
 fn corexy() -> Result<Machine, Failure> {
-    let joint = Joint { min: 0.0, max: 200.0 };
+    let joint = JointRange { min: 0.0, max: 200.0 };
     Ok(Machine::new(MachineParts {
         name: "CoreXY".into(),
-        geometry: Geometry::Cartesian(Cartesian),
+        mechanism: std::sync::Arc::new(Cartesian),
         joints: [joint; 2],
         min_manipulability: 0.0,
         coupling: [[1.0, 1.0], [1.0, -1.0]],
@@ -298,8 +298,8 @@ fn arm() -> Result<Machine, Failure> {
     let counts = 3200.0 / std::f64::consts::TAU;
     Ok(Machine::new(MachineParts {
         name: "arm".into(),
-        geometry: Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
-        joints: [Joint::FREE; 2],
+        mechanism: std::sync::Arc::new(TwoLink { l1_mm: 206.0, l2_mm: 256.0, elbow_left: true }),
+        joints: [JointRange::FREE; 2],
         min_manipulability: 0.1,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: ["arm1", "arm2"].map(|name| motor(name, counts, 0.0, 1.0, 5.0)),

@@ -2,7 +2,7 @@
 //! time parametrization needs.
 
 use drawing::{Point, Segment, Vec2};
-use kinematics::{Fault, Geometry, JointPos, Machine, MotorPos, OutOfReach, Unreachable};
+use kinematics::{Fault, JointKind, JointPos, Machine, MotorPos, OutOfReach, Unreachable};
 
 use crate::path::{Piece, Section};
 
@@ -120,7 +120,7 @@ impl JointPath {
     ///
     /// Intervals are bisected until
     /// 1. linear joint motion over an interval stays within `tolerance` mm of the curve, by
-    ///    [`kinematics::Geometry::second_derivative_bound`] plus the curve's own chord error;
+    ///    [`kinematics::Mechanism::second_derivative_bound`] plus the curve's own chord error;
     /// 2. no joint rotates by more than 0.15 rad over it;
     /// 3. the motors' derivatives in its middle are within 2 % of the mean of its ends, as a share
     ///    of the constraint that limits the pen.
@@ -168,7 +168,7 @@ impl GridInterval {
         let at = |share: f64| {
             let t = ((self.start + share * self.length) * piece.rate).min(1.0);
             // Derivatives do not depend on the turn about the base.
-            let pose = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
+            let pose = machine.mechanism().inverse(piece.curve.eval(t)).ok()?;
             let (first, second) = motor_derivatives(machine, piece, t, &pose);
             Some((first, second))
         };
@@ -335,7 +335,7 @@ impl Builder<'_> {
         middle: &Sample,
         b: &Sample,
     ) -> Result<f64, OutOfReach> {
-        let even = matches!(self.machine.geometry(), Geometry::Cartesian(_));
+        let even = self.machine.mechanism().is_linear();
         if even && piece.curve.third_derivative(0.0) == Vec2::ZERO {
             return Ok(0.0);
         }
@@ -356,8 +356,8 @@ impl Builder<'_> {
 
     /// The largest rotation of a joint between two samples, rad.
     fn joint_change(&self, a: &Sample, b: &Sample) -> f64 {
-        let angles = self.machine.geometry().joint_is_angle();
-        let of = |k: usize| if angles[k] { (b.pose[k] - a.pose[k]).abs() } else { 0.0 };
+        let kinds = self.machine.mechanism().joint_kinds();
+        let of = |k: usize| if kinds[k] == JointKind::Revolute { (b.pose[k] - a.pose[k]).abs() } else { 0.0 };
         of(0).max(of(1))
     }
 
@@ -368,7 +368,7 @@ impl Builder<'_> {
             .normal_second_derivative
             .max(middle.derivatives.normal_second_derivative)
             .max(b.derivatives.normal_second_derivative);
-        let deviation = (self.machine.geometry().second_derivative_bound(&a.pose, &b.pose)
+        let deviation = (self.machine.mechanism().second_derivative_bound(&a.pose, &b.pose)
             + length * length * turning)
             / 8.0;
         self.joint_change(a, b) <= LARGEST_TURN && deviation <= self.tolerance
@@ -396,7 +396,7 @@ pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f
     if machine.pen().max_travel_speed_mm_s == f64::INFINITY {
         return 0.0;
     }
-    let geometry = machine.geometry();
+    let geometry = machine.mechanism();
     let change = to - from;
     let speed = |k: u32| {
         let pose = from + f64::from(k) / f64::from(PARTS) * change;
@@ -428,7 +428,7 @@ impl PathDerivatives {
         let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let pen_speed = velocity.hypot2().sqrt();
         let normal_second_derivative = velocity.cross(acceleration).abs() / pen_speed;
-        let geometry = machine.geometry();
+        let geometry = machine.mechanism();
         let (rates, _) = geometry.path_derivatives(pose, velocity, acceleration);
         let (first, second) = machine.motor_derivatives(pose, velocity, acceleration);
         // A nonuniform parameter does not bend a straight line; on a curve take all of p'' as a

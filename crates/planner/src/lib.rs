@@ -31,8 +31,8 @@
 //!     max_speed_ticks_s: 8000.0, max_acceleration_ticks_s2: 80_000.0, max_jerk_ticks_s3: None,
 //! };
 //! let machine = Machine::new(MachineParts {
-//!     name: "table".into(), geometry: Geometry::Cartesian(Cartesian),
-//!     joints: [Joint { min: 0.0, max: 300.0 }; 2], min_manipulability: 0.0,
+//!     name: "table".into(), mechanism: std::sync::Arc::new(Cartesian),
+//!     joints: [JointRange { min: 0.0, max: 300.0 }; 2], min_manipulability: 0.0,
 //!     coupling: [[1.0, 0.0], [0.0, 1.0]], motors: [axis("x"), axis("y")],
 //!     pen: PenLimits {
 //!         max_speed_mm_s: 100.0, max_travel_speed_mm_s: 100.0, lift_time_s: 0.1, drop_time_s: 0.1,

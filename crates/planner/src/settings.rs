@@ -97,7 +97,7 @@ impl ToleranceBudget {
         let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration_ticks_s2);
         let pen_acceleration = |pose: &JointPos| {
             let of = |rates: MotorPos| {
-                machine.geometry().pen_velocity(pose, &machine.joint_rates(&rates)).hypot2().sqrt()
+                machine.mechanism().pen_velocity(pose, &machine.joint_rates(&rates)).hypot2().sqrt()
             };
             of(MotorPos::new(a, b)).max(of(MotorPos::new(a, -b)))
         };

@@ -6,8 +6,7 @@ use kinematics::Machine;
 use planner::unstable::JointPath;
 use planner::unstable::{CornerBlend, PathBudget, sections};
 use planner::unstable::{SpeedCap, profile};
-
-mod machines;
+use test_support::machines;
 
 const BUDGET: PathBudget = PathBudget {
     chord_mm: 0.01,

@@ -9,8 +9,7 @@ use planner::{Easing, ExactRow, PlanError, Settings, TimingLaw, plan};
 use planner::{PlacementOptions, Scale, place};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
-
-mod machines;
+use test_support::machines;
 
 fn machine() -> impl Strategy<Value = Machine> {
     let plain = prop_oneof![Just(machines::arm()), Just(machines::corexy()), Just(machines::polar())];

@@ -22,8 +22,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 use planner::unstable::{CornerBlend, PathBudget, Piece, sections};
 use planner::unstable::{JointPath, PathGeometry, SpeedCap, profile};
 use proptest::prelude::*;
-
-mod machines;
+use test_support::machines;
 
 /// Corners blended within 0.05 mm, and nothing else: the rows' share of the tolerance does not
 /// matter here.

@@ -11,7 +11,7 @@
 use std::time::Instant;
 
 use drawing::{Affine, Drawing, Pen, Point, Span, Stroke, Vec2};
-use kinematics::{Geometry, JointPos, Machine, MachineParts, TwoLink};
+use kinematics::{JointPos, Machine, MachineParts, TwoLink};
 use plan::Row;
 use verify::Verifier;
 
@@ -47,7 +47,7 @@ fn rows(machine: &Machine, drawing: &Drawing, step: f64, period_us: u64) -> Vec<
             rows.push((row, [exact[0], exact[1]]));
         }
     };
-    push(0, machine.geometry().forward(&machine.start()));
+    push(0, machine.mechanism().forward(&machine.start()));
     for stroke in &drawing.strokes {
         push(0, stroke.start());
         let mut left = 0.0;
@@ -93,7 +93,7 @@ fn measure(name: &str, machine: &Machine, drawing: &Drawing, step: f64, period_u
 fn fine_arm() -> Option<Machine> {
     let coarse = common::arm();
     let mut parts: MachineParts = coarse.parts().clone();
-    parts.geometry = Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true });
+    parts.mechanism = std::sync::Arc::new(TwoLink { l1_mm: 206.0, l2_mm: 256.0, elbow_left: true });
     parts.motors.iter_mut().for_each(|motor| motor.ticks_per_unit *= 100.0);
     parts.start = JointPos::new(1.0, 0.5);
     Machine::new(parts).ok()

@@ -194,7 +194,7 @@ impl<'a> Verifier<'a> {
 
     fn pose(&self, ticks: [f64; MOTORS]) -> Pose {
         let joints = self.machine.joint_positions(&MotorPos::new(ticks[0], ticks[1]));
-        Pose { joints, point: self.machine.geometry().forward(&joints) }
+        Pose { joints, point: self.machine.mechanism().forward(&joints) }
     }
 
     fn check_joints(&mut self, pose: &Pose, here: Location) {
@@ -452,7 +452,7 @@ impl<'a> Verifier<'a> {
 /// The joints then move evenly too. Over the whole step the path's second derivative is `B = bend(from, to)` long at the
 /// most; over one of `n` equal parts it is `B / n²`, and the path leaves that part's chord by `B / (8 n²)` at the most.
 fn draw(trace: &mut Trace, target: &Target, machine: &Machine, from: &Pose, to: &Pose, at: At) {
-    let geometry = machine.geometry();
+    let geometry = machine.mechanism();
     let bulge = geometry.second_derivative_bound(&from.joints, &to.joints) / 8.0;
     let allowed = trace.tolerance() * BULGE;
     if bulge <= allowed {
@@ -532,7 +532,7 @@ impl Floor {
     fn add(&mut self, machine: &Machine, pose: &Pose, weight: f64) {
         let worst = machine.quantization_error(&pose.joints);
         let square: f64 = [MotorPos::new(1.0, 0.0), MotorPos::new(0.0, 1.0)]
-            .map(|tick| machine.geometry().pen_velocity(&pose.joints, &machine.joint_rates(&tick)).hypot2())
+            .map(|tick| machine.mechanism().pen_velocity(&pose.joints, &machine.joint_rates(&tick)).hypot2())
             .iter()
             .sum();
         self.at = Some(pose.point);

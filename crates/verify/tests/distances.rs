@@ -218,7 +218,7 @@ fn rows_through(machine: &Machine, lines: &Lines) -> Vec<(u16, [f64; 2])> {
         let exact = machine.motor_positions(&near);
         [exact[0], exact[1]]
     };
-    let mut rows = vec![(0, ticks(machine.geometry().forward(&machine.start())))];
+    let mut rows = vec![(0, ticks(machine.mechanism().forward(&machine.start())))];
     for (pen, points) in lines {
         let exact: Vec<_> = points.iter().map(|p| ticks(*p)).collect();
         rows.push((0, exact[0]));

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Plotter, arm, cartesian, drawing, polar, sentences};
 use drawing::Drawing;
-use kinematics::{Joint, Machine};
+use kinematics::{JointRange, Machine};
 use verify::{Certificate, PenMotion, Violation};
 
 const SQUARE: &[(f64, f64)] = &[(20.0, 20.0), (60.0, 20.0), (60.0, 50.0), (20.0, 50.0), (20.0, 20.0)];
@@ -390,7 +390,7 @@ fn the_pen_down_at_either_end() {
 #[test]
 fn beyond_a_joint() {
     let mut parts = cartesian().parts().clone();
-    parts.joints[0] = Joint { min: 0.0, max: 97.0 };
+    parts.joints[0] = JointRange { min: 0.0, max: 97.0 };
     let machine = Machine::new(parts).expect("a sound machine");
     let free = cartesian();
     let plotter = good(&free);
@@ -405,7 +405,7 @@ fn beyond_a_joint() {
 #[test]
 fn half_a_tick_beyond_a_joint_is_rounding() {
     let mut parts = cartesian().parts().clone();
-    parts.joints[0] = Joint { min: 0.0, max: 97.2956 };
+    parts.joints[0] = JointRange { min: 0.0, max: 97.2956 };
     let machine = Machine::new(parts).expect("a sound machine");
     let picture = drawing(&[(1, &[(80.0, 30.0), (97.2956, 71.9)])]);
     let mut plotter = Plotter::new(&machine);

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
-use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, TwoLink};
+use kinematics::{Cartesian, JointPos, JointRange, Machine, MachineParts, Motor, PenLimits, TwoLink};
 use planner::placement::{PlacementOptions, Scale, place};
 use planner::unstable::{
     CornerBlend, JointPath, PathBudget, PathGeometry, Profile, SpeedCap, profile, profile_without_refinement,
@@ -211,10 +211,10 @@ fn motor(name: &str, counts: f64, speed: f64, acceleration: f64) -> Motor {
 }
 
 fn corexy() -> Result<Machine> {
-    let joint = Joint { min: -50.0, max: 400.0 };
+    let joint = JointRange { min: -50.0, max: 400.0 };
     Ok(Machine::new(MachineParts {
         name: "workload".into(),
-        geometry: Geometry::Cartesian(Cartesian),
+        mechanism: std::sync::Arc::new(Cartesian),
         joints: [joint; 2],
         min_manipulability: 0.0,
         coupling: [[1.0, 1.0], [1.0, -1.0]],
@@ -236,8 +236,8 @@ fn arm() -> Result<Machine> {
     let counts = 32_000.0 / std::f64::consts::TAU;
     Ok(Machine::new(MachineParts {
         name: "arm".into(),
-        geometry: Geometry::TwoLink(TwoLink { l1: 206.0, l2: 256.0, elbow_left: true }),
-        joints: [Joint::FREE; 2],
+        mechanism: std::sync::Arc::new(TwoLink { l1_mm: 206.0, l2_mm: 256.0, elbow_left: true }),
+        joints: [JointRange::FREE; 2],
         min_manipulability: 0.1,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors: ["arm1", "arm2"].map(|name| motor(name, counts, 1.0, 5.0)),

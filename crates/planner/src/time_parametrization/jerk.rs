@@ -98,7 +98,7 @@ struct PointConstraints {
 impl PointConstraints {
     fn at(machine: &Machine, piece: &Piece, s: f64) -> Option<Self> {
         let t = (s * piece.rate).clamp(0.0, 1.0);
-        let pose: JointPos = machine.geometry().inverse(piece.curve.eval(t)).ok()?;
+        let pose: JointPos = machine.mechanism().inverse(piece.curve.eval(t)).ok()?;
         let PathDerivatives { first: m1, second: m2, pen_speed, second_derivative_bound, .. } =
             PathDerivatives::of(machine, piece, t, &pose);
         let m3 = third_derivative(machine, piece, t, &pose);

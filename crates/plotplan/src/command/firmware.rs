@@ -3,7 +3,7 @@
 use backends::{Instant, WriteError, ebb, gcode};
 use compiler::pipeline::Compiled;
 use drawing::{Pen, Point};
-use kinematics::{Geometry, Machine, MotorPos};
+use kinematics::{JointKind, Machine, MotorPos};
 use planner::ExactRow;
 
 use crate::cli::{Convert, Format, PenBy, PenLift};
@@ -46,7 +46,7 @@ pub(crate) fn write(arguments: &Convert, machine: &Machine, compiled: &Compiled<
 /// The instants of a plan: rows with what firmware formats want to know beside them.
 pub(crate) fn instant(machine: &Machine, row: plan::Row, exact: [f64; 2]) -> Instant {
     let joints = machine.joint_positions(&MotorPos::from(exact));
-    Instant { row, exact, joints: joints.into(), at: machine.geometry().forward(&joints) }
+    Instant { row, exact, joints: joints.into(), at: machine.mechanism().forward(&joints) }
 }
 
 fn put(
@@ -76,11 +76,11 @@ fn put(
         Format::KlipperSteps => backends::klipper_steps::write(rows(), out),
         Format::JointTrajectory => {
             let instants: Vec<Instant> = instants().collect();
-            let geometry = machine.geometry();
+            let geometry = machine.mechanism();
             backends::joint_trajectory::write(
                 &instants,
                 geometry.joint_names(),
-                geometry.joint_is_angle(),
+                geometry.joint_kinds().map(|kind| kind == JointKind::Revolute),
                 out,
             )
         }
@@ -89,7 +89,7 @@ fn put(
         other => {
             let options = gcode_options(flavour(other), machine, arguments.pen);
             let speeds = stroke_speeds(machine, compiled);
-            let park = machine.geometry().forward(&machine.start());
+            let park = machine.mechanism().forward(&machine.start());
             gcode::write(&gcode::commands(compiled.ordered(), &speeds, park, &options), out)
         }
     }
@@ -164,20 +164,17 @@ fn stroke_speeds(machine: &Machine, compiled: &Compiled<'_>) -> Vec<f64> {
 
 /// Whether the format is one for machines of this shape.
 fn suits(format: Format, machine: &Machine) -> Result<(), Failure> {
-    let geometry = machine.geometry();
+    let kind = machine.mechanism().kind();
     let coupling = machine.coupling().rows();
     let is = |rows: [[f64; 2]; 2]| (0..2).all(|i| (0..2).all(|j| coupling[i][j] == rows[i][j]));
     let (holds, wants) = match format {
         Format::CoaxialCommands | Format::CoaxialCommandsInches => {
-            (matches!(geometry, Geometry::TwoLink(_)), "an arm with two links, such as coaxial")
+            (kind == "two-link", "an arm with two links, such as coaxial")
         }
-        Format::XySerial => (
-            matches!(geometry, Geometry::Cartesian(_)) && is([[1.0, 1.0], [-1.0, 1.0]]),
-            "a single-belt table such as hbot",
-        ),
-        Format::PolarCsv | Format::CArrays => {
-            (matches!(geometry, Geometry::Polar(_)), "a turning rail with a rack, such as polar")
+        Format::XySerial => {
+            (kind == "cartesian" && is([[1.0, 1.0], [-1.0, 1.0]]), "a single-belt table such as hbot")
         }
+        Format::PolarCsv | Format::CArrays => (kind == "polar", "a turning rail with a rack, such as polar"),
         _ => (true, ""),
     };
     if holds {

@@ -39,7 +39,7 @@ fn check(file: &str) -> Result<String, Failure> {
     let machine = input::machine(file)?.machine;
     let sheet = machine.sheet();
     let mut text = format!("{} holds together\n", machine.name());
-    let joints = machine.geometry().joint_names();
+    let joints = machine.mechanism().joint_names();
     for (k, motor) in machine.motors().iter().enumerate() {
         let row = machine.coupling().rows()[k];
         let _ = write!(

@@ -4,7 +4,7 @@
 
 use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
 use kinematics::{
-    Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits, Polar, TwoLink,
+    Cartesian, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits, Polar, TwoLink,
 };
 use plan::{Header, Limits, Row};
 use verify::{Certificate, Verifier};
@@ -23,11 +23,16 @@ fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration:
     }
 }
 
-fn parts(name: &str, geometry: Geometry, motors: [Motor; 2], start: JointPos) -> MachineParts {
+fn parts(
+    name: &str,
+    mechanism: impl Mechanism + 'static,
+    motors: [Motor; 2],
+    start: JointPos,
+) -> MachineParts {
     MachineParts {
         name: name.into(),
-        geometry,
-        joints: [Joint::FREE; 2],
+        mechanism: std::sync::Arc::new(mechanism),
+        joints: [JointRange::FREE; 2],
         min_manipulability: 0.0,
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         motors,
@@ -46,8 +51,8 @@ fn parts(name: &str, geometry: Geometry, motors: [Motor; 2], start: JointPos) ->
 /// x and y at 100 ticks/mm, 100 mm/s and 1000 mm/s²; joints from 0 to 200 mm; starts at (0, 0).
 pub fn cartesian() -> Machine {
     let motors = [motor("x", 100.0, 0.0, 1e4, 1e5), motor("y", 100.0, 0.0, 1e4, 1e5)];
-    let mut parts = parts("cartesian", Geometry::Cartesian(Cartesian), motors, JointPos::new(0.0, 0.0));
-    parts.joints = [Joint { min: 0.0, max: 200.0 }; 2];
+    let mut parts = parts("cartesian", Cartesian, motors, JointPos::new(0.0, 0.0));
+    parts.joints = [JointRange { min: 0.0, max: 200.0 }; 2];
     Machine::new(parts).expect("a sound machine")
 }
 
@@ -56,16 +61,14 @@ pub fn arm() -> Machine {
     let counts = 3200.0 / std::f64::consts::TAU;
     let up = std::f64::consts::FRAC_PI_2;
     let motors = [motor("arm1", counts, 0.0, 533.3, 2666.7), motor("arm2", -counts, 800.0, 533.3, 2666.7)];
-    let arm = TwoLink { l1: 206.0, l2: 256.0, elbow_left: true };
-    Machine::new(parts("arm", Geometry::TwoLink(arm), motors, JointPos::new(up, up)))
-        .expect("a sound machine")
+    let arm = TwoLink { l1_mm: 206.0, l2_mm: 256.0, elbow_left: true };
+    Machine::new(parts("arm", arm, motors, JointPos::new(up, up))).expect("a sound machine")
 }
 
 /// Angle and radius, the angle in steps of 1/2000 rad.
 pub fn polar() -> Machine {
     let motors = [motor("phi", 2000.0, 0.0, 4e3, 4e4), motor("r", 100.0, 0.0, 1e4, 1e5)];
-    Machine::new(parts("polar", Geometry::Polar(Polar), motors, JointPos::new(0.5, 60.0)))
-        .expect("a sound machine")
+    Machine::new(parts("polar", Polar, motors, JointPos::new(0.5, 60.0))).expect("a sound machine")
 }
 
 pub fn header(machine: &Machine) -> Header {
@@ -189,7 +192,7 @@ impl<'a> Plotter<'a> {
 
     /// Straight on paper.
     pub fn line(&mut self, x: f64, y: f64) -> &mut Self {
-        let from = self.machine.geometry().forward(&self.joints);
+        let from = self.machine.mechanism().forward(&self.joints);
         let (machine, near, to) = (self.machine, self.joints, Point::new(x, y));
         self.follow(|u| machine.pose_near(from.lerp(to, u), &near).expect("a point within reach"))
     }

@@ -1,8 +1,10 @@
 //! A planar arm of two links.
 
-use drawing::{Point, Vec2};
+use drawing::{Line, Point, Vec2};
 
-use super::{JointPos, Unreachable, frame};
+use super::parameters::{FromParameters, ParameterError, Parameters};
+use super::{JointKind, Mechanism, Unreachable, frame};
+use crate::{JointPos, MachineError};
 
 /// `q = (theta, psi)`, the **absolute** angles of the first and second link:
 ///
@@ -30,20 +32,37 @@ use super::{JointPos, Unreachable, frame};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoLink {
     /// Length of the first link, mm.
-    pub l1: f64,
+    pub l1_mm: f64,
     /// Length of the second link, mm.
-    pub l2: f64,
+    pub l2_mm: f64,
     /// Whether the elbow is on the left of the line from base to pen, seen along it.
     pub elbow_left: bool,
 }
 
-impl TwoLink {
-    pub(super) fn forward(self, q: &JointPos) -> Point {
-        (self.l1 * frame(q[0]).0 + self.l2 * frame(q[1]).0).to_point()
+impl Mechanism for TwoLink {
+    fn kind(&self) -> &'static str {
+        Self::KIND
     }
 
-    pub(super) fn inverse(self, p: Point) -> Result<JointPos, Unreachable> {
-        let Self { l1, l2, elbow_left } = self;
+    fn joint_names(&self) -> [&'static str; 2] {
+        ["theta", "psi"]
+    }
+
+    fn joint_kinds(&self) -> [JointKind; 2] {
+        [JointKind::Revolute; 2]
+    }
+
+    fn validate(&self) -> Result<(), MachineError> {
+        MachineError::require_positive("l1", self.l1_mm)?;
+        MachineError::require_positive("l2", self.l2_mm)
+    }
+
+    fn forward(&self, q: &JointPos) -> Point {
+        (self.l1_mm * frame(q[0]).0 + self.l2_mm * frame(q[1]).0).to_point()
+    }
+
+    fn inverse(&self, p: Point) -> Result<JointPos, Unreachable> {
+        let Self { l1_mm: l1, l2_mm: l2, elbow_left } = *self;
         let r = libm::hypot(p.x, p.y);
         let (farthest, nearest) = (l1 + l2, (l1 - l2).abs());
         if r > farthest {
@@ -73,13 +92,13 @@ impl TwoLink {
         Ok(JointPos::new(theta, psi))
     }
 
-    pub(super) fn jacobian(self, q: &JointPos) -> [Vec2; 2] {
-        let [t1, t2] = [self.l1 * frame(q[0]).1, self.l2 * frame(q[1]).1];
+    fn jacobian(&self, q: &JointPos) -> [Vec2; 2] {
+        let [t1, t2] = [self.l1_mm * frame(q[0]).1, self.l2_mm * frame(q[1]).1];
         [t1, t2]
     }
 
-    pub(super) fn path_derivatives(self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
-        let Self { l1, l2, .. } = self;
+    fn path_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
+        let Self { l1_mm: l1, l2_mm: l2, .. } = *self;
         let ((e1, t1), (e2, _)) = (frame(q[0]), frame(q[1]));
         // sin and cos of beta from the two directions.
         let (sin, cos) = (t1.dot(e2), e1.dot(e2));
@@ -91,14 +110,8 @@ impl TwoLink {
         (JointPos::new(theta_1, psi_1), JointPos::new(theta_2, psi_2))
     }
 
-    pub(super) fn path_third_derivative(
-        self,
-        q: &JointPos,
-        first: Vec2,
-        second: Vec2,
-        third: Vec2,
-    ) -> JointPos {
-        let Self { l1, l2, .. } = self;
+    fn path_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> JointPos {
+        let Self { l1_mm: l1, l2_mm: l2, .. } = *self;
         let ((e1, t1), (e2, _)) = (frame(q[0]), frame(q[1]));
         let (sin, cos) = (t1.dot(e2), e1.dot(e2));
         let (rates, turns) = self.path_derivatives(q, first, second);
@@ -110,13 +123,64 @@ impl TwoLink {
     }
 
     /// d²p/du² = -L1 theta'^2 e(theta) - L2 psi'^2 e(psi), whatever the coupling.
-    pub(super) fn second_derivative_bound(self, from: &JointPos, to: &JointPos) -> f64 {
+    fn second_derivative_bound(&self, from: &JointPos, to: &JointPos) -> f64 {
         let change = *to - *from;
-        self.l1 * change[0] * change[0] + self.l2 * change[1] * change[1]
+        self.l1_mm * change[0] * change[0] + self.l2_mm * change[1] * change[1]
     }
 
     /// |sin beta|.
-    pub(super) fn manipulability(self, q: &JointPos) -> f64 {
+    fn manipulability(&self, q: &JointPos) -> f64 {
         libm::sin(q[1] - q[0]).abs()
+    }
+
+    /// The joints turn at most ten times as fast as they need to elsewhere.
+    fn default_min_manipulability(&self) -> f64 {
+        0.1
+    }
+
+    fn full_rotation(&self) -> Option<JointPos> {
+        Some(JointPos::new(std::f64::consts::TAU, std::f64::consts::TAU))
+    }
+
+    fn base(&self) -> Option<Point> {
+        Some(Point::ZERO)
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    /// theta' = 0 where the second link is perpendicular to the line, psi' = 0 where the first is (see
+    /// the derivatives above). With n the line's normal at distance d from the base: in the first case
+    /// the elbow is at the distance d -+ L2 along n and on the circle about the base; in the second it
+    /// is at +-L1 n, and the pen on the circle about it.
+    fn joint_extrema_on_line(&self, line: &Line) -> Vec<f64> {
+        let Self { l1_mm: l1, l2_mm: l2, .. } = *self;
+        let along = line.p1 - line.p0;
+        let length = along.hypot2().sqrt();
+        let u = along / length;
+        let (start, d) = (line.p0.to_vec2().dot(u), line.p0.to_vec2().dot(Vec2::new(-u.y, u.x)));
+        let mut extrema = Vec::with_capacity(8);
+        for (offset, radius) in [(d - l2, l1), (d + l2, l1), (d - l1, l2), (d + l1, l2)] {
+            let square = radius * radius - offset * offset;
+            if square >= 0.0 {
+                let x = square.sqrt();
+                extrema.extend([(-x - start) / length, (x - start) / length]);
+            }
+        }
+        extrema
+    }
+}
+
+impl FromParameters for TwoLink {
+    const KIND: &'static str = "two-link";
+    const PARAMETERS: &'static [&'static str] = &["l1", "l2", "elbow"];
+
+    fn from_parameters(parameters: &mut dyn Parameters) -> Result<Self, ParameterError> {
+        Ok(Self {
+            l1_mm: parameters.length_mm("l1")?,
+            l2_mm: parameters.length_mm("l2")?,
+            elbow_left: parameters.choice("elbow", &["left", "right"])? == 0,
+        })
     }
 }

@@ -2,7 +2,9 @@
 
 use drawing::{Point, Vec2};
 
-use super::{JointPos, Unreachable, frame};
+use super::parameters::{FromParameters, ParameterError, Parameters};
+use super::{JointKind, Mechanism, Unreachable, frame};
+use crate::JointPos;
 
 /// `q = (phi, r)`: `p = r e(phi)`, with e(phi) = (cos phi, sin phi) and t(phi) = (-sin phi, cos phi).
 ///
@@ -17,23 +19,34 @@ use super::{JointPos, Unreachable, frame};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polar;
 
-impl Polar {
-    pub(super) fn forward(self, q: &JointPos) -> Point {
+impl Mechanism for Polar {
+    fn kind(&self) -> &'static str {
+        Self::KIND
+    }
+
+    fn joint_names(&self) -> [&'static str; 2] {
+        ["phi", "r"]
+    }
+
+    fn joint_kinds(&self) -> [JointKind; 2] {
+        [JointKind::Revolute, JointKind::Prismatic]
+    }
+
+    fn forward(&self, q: &JointPos) -> Point {
         (q[1] * frame(q[0]).0).to_point()
     }
 
     /// Every point has a pose; at the pole, which is singular, phi is 0.
-    #[expect(clippy::unnecessary_wraps, reason = "the same shape as the other geometries")]
-    pub(super) fn inverse(self, p: Point) -> Result<JointPos, Unreachable> {
+    fn inverse(&self, p: Point) -> Result<JointPos, Unreachable> {
         Ok(JointPos::new(libm::atan2(p.y, p.x), libm::hypot(p.x, p.y)))
     }
 
-    pub(super) fn jacobian(self, q: &JointPos) -> [Vec2; 2] {
+    fn jacobian(&self, q: &JointPos) -> [Vec2; 2] {
         let (e, t) = frame(q[0]);
         [q[1] * t, e]
     }
 
-    pub(super) fn path_derivatives(self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
+    fn path_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
         let ((e, t), r) = (frame(q[0]), q[1]);
         let (phi_1, r_1) = (first.dot(t) / r, first.dot(e));
         let phi_2 = (second.dot(t) - 2.0 * r_1 * phi_1) / r;
@@ -41,13 +54,7 @@ impl Polar {
         (JointPos::new(phi_1, r_1), JointPos::new(phi_2, r_2))
     }
 
-    pub(super) fn path_third_derivative(
-        self,
-        q: &JointPos,
-        first: Vec2,
-        second: Vec2,
-        third: Vec2,
-    ) -> JointPos {
+    fn path_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> JointPos {
         let ((e, t), r) = (frame(q[0]), q[1]);
         let (rates, turns) = self.path_derivatives(q, first, second);
         let ((phi_1, r_1), (phi_2, r_2)) = ((rates[0], rates[1]), (turns[0], turns[1]));
@@ -57,13 +64,40 @@ impl Polar {
     }
 
     /// d²p/du² = 2 r' phi' t - r phi'^2 e, largest where r is.
-    pub(super) fn second_derivative_bound(self, from: &JointPos, to: &JointPos) -> f64 {
+    fn second_derivative_bound(&self, from: &JointPos, to: &JointPos) -> f64 {
         let change = *to - *from;
         libm::hypot(2.0 * change[1] * change[0], from[1].abs().max(to[1].abs()) * change[0] * change[0])
     }
 
     /// r counted in units of a page's centimetre: the angle is well held from 10 mm on.
-    pub(super) fn manipulability(self, q: &JointPos) -> f64 {
+    fn manipulability(&self, q: &JointPos) -> f64 {
         (q[1].abs() / 10.0).min(1.0)
+    }
+
+    /// The pen draws no nearer to the pole than 1 mm.
+    fn default_min_manipulability(&self) -> f64 {
+        0.1
+    }
+
+    fn full_rotation(&self) -> Option<JointPos> {
+        Some(JointPos::new(std::f64::consts::TAU, 0.0))
+    }
+
+    fn base(&self) -> Option<Point> {
+        Some(Point::ZERO)
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+    // No joint_extrema_on_line: phi is monotone on a whole line, r on both sides of the foot.
+}
+
+impl FromParameters for Polar {
+    const KIND: &'static str = "polar";
+    const PARAMETERS: &'static [&'static str] = &[];
+
+    fn from_parameters(_parameters: &mut dyn Parameters) -> Result<Self, ParameterError> {
+        Ok(Self)
     }
 }
