@@ -21,6 +21,9 @@ fn posed() -> impl Strategy<Value = (Arc<dyn Mechanism>, JointPos)> {
     })
 }
 
+/// Parts of a line in which joints are tested to be monotone.
+const PARTS: u32 = 400;
+
 fn size(v: Vec2) -> f64 {
     v.hypot2().sqrt()
 }
@@ -181,7 +184,6 @@ proptest! {
         let mut parameters = m.joint_extrema_on_line(&line);
         parameters.extend(m.base().map(|base| (base - p).dot(along) / along.hypot2()));
         let cut = |low: f64, high: f64| parameters.iter().any(|t| *t >= low && *t <= high);
-        const PARTS: u32 = 400;
         let pose = |k: u32| m.inverse(p + f64::from(k) / f64::from(PARTS) * along).ok();
         let mut last: Option<JointPos> = None;
         let mut from = Some(q);

@@ -60,8 +60,10 @@ pub struct Kind {
     pub name: &'static str,
     /// The names of its parameters.
     pub parameters: &'static [&'static str],
-    build: fn(&mut dyn Parameters) -> Result<Arc<dyn Mechanism>, ParameterError>,
+    build: Constructor,
 }
+
+type Constructor = fn(&mut dyn Parameters) -> Result<Arc<dyn Mechanism>, ParameterError>;
 
 /// A mechanism that machine files can describe.
 pub(super) trait FromParameters: Mechanism + Sized + 'static {
