@@ -1,6 +1,7 @@
-//! Rows a second through the verifier: `cargo run --release -p plotplan-verify --example throughput [-- PART-OF-A-NAME]`.
+//! Rows a second through the verifier:
+//! `cargo run --release -p plotplan-verify --example throughput [-- PART-OF-A-NAME]`.
 //!
-//! The plans run through the drawing's points at an even speed; what the motors would say to that is no matter here.
+//! The plans follow the drawing at a constant speed and ignore motor limits.
 
 #![expect(
     clippy::print_stdout,
@@ -10,15 +11,31 @@
 
 use std::time::Instant;
 
-use drawing::{Affine, Drawing, Pen, Point, Span, Stroke, Vec2};
-use kinematics::{JointPos, Machine, MachineParts, TwoLink};
+use drawing::{Affine, Drawing, Pen, Point, Rect, Span, Stroke, Vec2};
+use kinematics::{Cartesian, JointPos, Machine, MachineParts, Motor, TwoLink};
 use plan::Row;
-use verify::Verifier;
+use verify::{Timing, Verifier};
 
-#[path = "../tests/common/mod.rs"]
-mod common;
+/// 100 ticks/mm on both axes.
+fn cartesian() -> Option<Machine> {
+    let motors = ["x", "y"].map(|name| Motor::new(name, 100.0, 1e4, 1e5));
+    let sheet = Rect::new(0.0, 0.0, 200.0, 200.0);
+    Machine::new(MachineParts::new("cartesian", Cartesian, motors, sheet)).ok()
+}
 
-/// Lines across a sheet of 160 mm, wavy with the given number of vertices each.
+/// The coaxial arm (report 1), with 3200 `factor` ticks a turn.
+fn arm(factor: f64, start: JointPos) -> Option<Machine> {
+    let ticks_per_rad = factor * 3200.0 / std::f64::consts::TAU;
+    let links = TwoLink { l1_mm: 206.0, l2_mm: 256.0, elbow_left: true };
+    let motors = [
+        Motor::new("arm1", ticks_per_rad, 533.3, 2666.7),
+        Motor { offset_ticks: 800.0, ..Motor::new("arm2", -ticks_per_rad, 533.3, 2666.7) },
+    ];
+    let sheet = Rect::new(0.0, 0.0, 200.0, 200.0);
+    Machine::new(MachineParts { start, ..MachineParts::new("arm", links, motors, sheet) }).ok()
+}
+
+/// Lines across a sheet of 160 mm; waves with the given number of vertices each.
 fn sheet(lines: u32, vertices: u32, wave: f64) -> Drawing {
     let strokes = (0..lines).filter_map(|line| {
         let y = 20.0 + 160.0 * f64::from(line) / f64::from(lines);
@@ -70,9 +87,9 @@ fn measure(name: &str, machine: &Machine, drawing: &Drawing, step: f64, period_u
         return;
     }
     let rows = rows(machine, drawing, step, period_us);
-    let header = plan::Header { period_us, ..common::header(machine) };
+    let timing = Timing { period_us, lift_overlap_us: 0 };
     let began = Instant::now();
-    let mut verifier = Verifier::new(machine, drawing, &header, 0.1);
+    let mut verifier = Verifier::new(machine, drawing, timing, 0.1);
     let built = began.elapsed();
     for (row, position) in &rows {
         verifier.row(*row, exact.then_some(*position));
@@ -89,22 +106,12 @@ fn measure(name: &str, machine: &Machine, drawing: &Drawing, step: f64, period_u
     );
 }
 
-/// Seed 1's arm with fine encoders, over the same sheet.
-fn fine_arm() -> Option<Machine> {
-    let coarse = common::arm();
-    let mut parts: MachineParts = coarse.parts().clone();
-    parts.mechanism = std::sync::Arc::new(TwoLink { l1_mm: 206.0, l2_mm: 256.0, elbow_left: true });
-    parts.motors.iter_mut().for_each(|motor| motor.ticks_per_unit *= 100.0);
-    parts.start = JointPos::new(1.0, 0.5);
-    Machine::new(parts).ok()
-}
-
 fn main() {
     let lines = sheet(400, 1, 0.0);
     let waves = sheet(325, 400, 0.5);
     let open = sheet(80, 400, 0.5);
     let dense = sheet(130, 10_000, 0.5);
-    let cartesian = common::cartesian();
+    let Some(cartesian) = cartesian() else { return };
     for (name, drawing) in [
         ("lines 0.4 mm apart", &lines),
         ("waves 2 mm apart", &open),
@@ -115,14 +122,15 @@ fn main() {
         measure(&format!("cartesian, 1 ms, {name}"), &cartesian, drawing, 0.05, 1_000, true);
     }
     measure("cartesian, 1 ms, ticks only, waves", &cartesian, &waves, 0.05, 1_000, false);
-    // Where the arm reaches.
+    // Into the reach of the arm.
     let mut waves = waves;
     waves.transform(Affine::translate((0.0, 150.0)));
-    if let Some(arm) = fine_arm() {
+    if let Some(arm) = arm(100.0, JointPos::new(1.0, 0.5)) {
         measure("arm, 10 ms, waves", &arm, &waves, 0.5, 10_000, true);
         measure("arm, 1 ms, waves", &arm, &waves, 0.05, 1_000, true);
     }
-    let coarse = common::arm();
+    let up = std::f64::consts::FRAC_PI_2;
+    let Some(coarse) = arm(1.0, JointPos::new(up, up)) else { return };
     measure("coarse arm, 10 ms, waves", &coarse, &waves, 0.5, 10_000, true);
     measure("coarse arm, 1 ms, waves", &coarse, &waves, 0.05, 1_000, true);
 }

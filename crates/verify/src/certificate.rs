@@ -1,49 +1,52 @@
-//! What a replay found, as plain data.
+//! The results of a replay, as plain data.
 
 use crate::Failure;
 
-/// What one plan does to one drawing on one machine, measured by replay.
+/// The results for one plan of one drawing on one machine, measured by replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
-    /// Whether nothing failed.
+    /// Whether there are no failures.
     pub holds: bool,
-    /// What failed: each kind once (each motor's limits apart), with the worst or the first place and how often.
+    /// The failures: each kind once (limits once a motor), with its worst or first location and its
+    /// count.
     pub failures: Vec<Failure>,
-    /// The tolerance that was claimed, mm.
+    /// The tolerance that was verified, mm.
     pub tolerance_mm: f64,
-    /// Between the drawing and the path through the exact motor positions; nothing when not every row came with them.
+    /// Between the drawing and the path through the exact motor positions. `None` unless every row
+    /// came with exact positions.
     pub before_rounding: Option<Deviation>,
     /// Between the drawing and the path through the whole ticks of the table.
     pub after_rounding: Deviation,
-    /// What whole ticks cost on this machine along this ink, whoever plans.
-    pub tick_floor: TickFloor,
-    /// Largest distance of a row's ticks from the exact motor positions it came with, ticks: at most 1/2 if rounding
-    /// never drifts. Nothing when not every row came with them.
+    /// The quantization error of this machine along this ink, independent of the planner.
+    pub quantization_error: QuantizationError,
+    /// Largest distance of a row's ticks from its exact motor positions: at most 1/2 if rounding
+    /// does not drift. `None` unless every row came with exact positions.
     pub largest_rounding_ticks: Option<f64>,
-    /// The pens that drew, each once, in the order of their first use.
+    /// The pens that drew, each once, in the order of first use.
     pub pens: Vec<u16>,
     /// Peaks of each motor, in the order of the columns.
     pub motors: [MotorPeak; plan::MOTORS],
-    /// How many rows there were.
+    /// Number of rows.
     pub rows: u64,
-    /// Time of the last row, microseconds.
+    /// Time of the last row, us.
     pub duration_us: u64,
-    /// Length drawn, mm: along the exact path where it is known, otherwise along the ticks (which is a little longer).
+    /// Length of the ink, mm: of the exact path if it is known, otherwise of the path of the ticks,
+    /// which is slightly longer.
     pub ink_mm: f64,
-    /// Length travelled with the pen up, mm, measured as straight from row to row.
+    /// Length of pen-up motion, mm, as straight lines from row to row.
     pub travel_mm: f64,
-    /// How often the pen was put down.
+    /// Number of times the pen was lowered.
     pub pen_downs: u64,
-    /// How often it was put down and lifted without moving.
+    /// Number of times it was lowered and lifted without moving.
     pub dots: u64,
 }
 
-/// The two one-sided (directed) Hausdorff distances between ink and drawing, pen by pen.
+/// The two directed Hausdorff distances between ink and drawing, pen by pen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
-    /// How far the ink strays: from each point of the ink to the nearest stroke of the same pen.
+    /// From each point of the ink to the nearest stroke of the same pen.
     pub ink_to_drawing: DeviationStats,
-    /// How much is missed: from each point of the drawing to the nearest ink of the same pen.
+    /// From each point of the drawing to the nearest ink of the same pen.
     pub drawing_to_ink: DeviationStats,
 }
 
@@ -54,72 +57,76 @@ impl Deviation {
     }
 }
 
-/// How a distance is spread along a length. Both figures are bounds from above.
+/// Statistics of a distance along a length. Both figures are upper bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeviationStats {
-    /// Largest distance, mm. Never understated; overstated by a hundredth of the tolerance at most for the ink, and for
-    /// the drawing by an eighth (by two thousandths where the ink's straight parts are no shorter than that).
+    /// Largest distance, mm. Never understated. Overstated by at most 1/100 of the tolerance for the
+    /// ink, and by at most 1/8 for the drawing (1/500 where straight parts of the ink are longer than
+    /// that).
     pub max_mm: f64,
-    /// 99 % of the length is at most so far, mm; overstated by 1/64 of itself at most. Dots have no length and count
-    /// for the maximum alone.
+    /// 99 % of the length has at most this distance, mm; overstated by at most 1/64 of itself. Dots
+    /// have no length and count for the maximum only.
     pub p99_mm: f64,
-    /// Whether the largest distance is only known to be more than `max_mm`: strokes that no ink came near.
+    /// Whether `max_mm` is only a lower bound, because no ink came near a part of the drawing.
     pub is_lower_bound: bool,
-    /// By how much more than `max_mm` the distance could be between the points that were looked at, mm. 0 except for
-    /// drawings of such a length that they can only be sampled sparsely.
+    /// Amount by which the distance between two sampled points may exceed `max_mm`, mm. 0 except for
+    /// drawings that are too long to be sampled densely.
     pub sampling_error_mm: f64,
 }
 
-/// The pen's error that comes from motors standing on whole ticks alone.
+/// The pen error caused by rounding motor positions to whole ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TickFloor {
-    /// Half a tick on both motors, the worse way, at the worst pose of the ink, mm.
+pub struct QuantizationError {
+    /// Half a tick on both motors in the worse direction, at the worst pose of the ink, mm.
     pub worst_mm: f64,
-    /// Root mean square over the ink: uniform rounding errors have the variance 1/12 tick², so it is
-    /// `sqrt(sum_i |J_i|^2 / 12)` with `J_i` the pen's movement for one tick of motor `i`, mm.
+    /// Root mean square along the ink, mm. Uniform rounding errors have the variance 1/12 tick², so
+    /// it is `sqrt(sum_i |J_i|² / 12)`, where `J_i` is the movement of the pen for one tick of
+    /// motor `i`.
     pub rms_mm: f64,
 }
 
-/// The hardest one motor is driven, in finite differences of the table's whole ticks.
+/// The peaks of one motor, in finite differences of the table's whole ticks.
 ///
-/// With steps of one period `T` the limits are `|first difference| <= v T + 1 tick` and
-/// `|second difference| <= a T^2 + 2 ticks`: the whole ticks are each half a tick off at most. A share is the
-/// difference divided by that bound, so that 1 is the most a good plan can show.
+/// With steps of one period `T` the bounds are `|first difference| <= v T + 1 tick` and
+/// `|second difference| <= a T² + 2 ticks`, because each tick is off by half a tick at most. A share
+/// is the difference divided by its bound: a good plan reaches at most 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorPeak {
-    /// The motor's name.
+    /// Name of the motor.
     pub name: String,
-    /// Largest first difference over time, ticks/s; includes the rounding of both its ticks.
+    /// Largest first difference over time, ticks/s; includes the rounding of its two ticks.
     pub speed_ticks_s: f64,
-    /// Largest second difference over time squared, ticks/s²; includes the rounding of its three ticks.
+    /// Largest second difference over time², ticks/s²; includes the rounding of its three ticks.
     pub acceleration_ticks_s2: f64,
-    /// The limit the plan states, ticks/s.
+    /// The speed limit of the machine, ticks/s.
     pub speed_limit_ticks_s: f64,
-    /// The limit the plan states, ticks/s².
+    /// The acceleration limit of the machine, ticks/s².
     pub acceleration_limit_ticks_s2: f64,
-    /// Largest share of the speed limit with its rounding allowance.
+    /// Largest share of the speed bound.
     pub speed_share: f64,
-    /// Largest share of the acceleration limit with its rounding allowance.
+    /// Largest share of the acceleration bound.
     pub acceleration_share: f64,
-    /// 99.9 % of the row steps in which this motor moves have a smaller share of the speed limit; overstated
-    /// by 1/64 of itself at most.
+    /// 99.9th percentile of the share of the speed bound, over the steps in which the motor moves;
+    /// overstated by at most 1/64 of itself.
     pub speed_share_p999: f64,
-    /// 99.9 % of the rows about which this motor moves have a smaller share of the acceleration limit;
-    /// overstated by 1/64 of itself at most.
+    /// 99.9th percentile of the share of the acceleration bound, over the rows at which the motor
+    /// moves; overstated by at most 1/64 of itself.
     pub acceleration_share_p999: f64,
-    /// The same for jerk, where the plan states a limit for it.
+    /// The same for jerk; `None` if the machine has no jerk limit.
     pub jerk: Option<JerkPeak>,
 }
 
-/// What one motor was seen to do to its jerk: with steps of one period `T` the limit is `|third difference| <= j T^3 + 4 ticks`.
+/// The peak jerk of one motor. With steps of one period `T` the bound is
+/// `|third difference| <= j T³ + 4 ticks`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JerkPeak {
-    /// Largest third difference over time cubed, ticks/s³; includes the rounding of its four ticks.
+    /// Largest third difference over time³, ticks/s³; includes the rounding of its four ticks.
     pub jerk_ticks_s3: f64,
-    /// The limit the plan states, ticks/s³.
+    /// The jerk limit of the machine, ticks/s³.
     pub limit_ticks_s3: f64,
-    /// Largest share of the limit with its rounding allowance.
+    /// Largest share of the bound.
     pub share: f64,
-    /// 99.9 % of the rows about which this motor moves have a smaller share; overstated by 1/64 of itself at most.
+    /// 99.9th percentile of the share, over the rows at which the motor moves; overstated by at most
+    /// 1/64 of itself.
     pub share_p999: f64,
 }

@@ -1,18 +1,18 @@
-//! What can be wrong with a plan, and where.
+//! Failures of a plan: kind, location and count.
 
 use std::fmt;
 
 use drawing::{Point, Span};
 use kinematics::Fault;
 
-/// Which way the pen itself moves while the motors stand still.
+/// A movement of the pen itself, during which the motors rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PenMotion {
-    /// Off the paper.
+    /// The pen is lifted.
     Lift,
-    /// Onto the paper.
+    /// The pen is lowered.
     Drop,
-    /// One pen is exchanged for another.
+    /// A pen is exchanged for another.
     Change,
 }
 
@@ -26,28 +26,36 @@ impl fmt::Display for PenMotion {
     }
 }
 
-/// One way in which a plan breaks its promise. Its `Display` is half a sentence, without the location.
+/// A kind of failure. `Display` gives the finding without its location.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Violation {
     /// The table has no rows at all.
     #[error("the plan has no rows")]
     Empty,
-    /// Time does not begin at 0.
-    #[error("time begins at {t_us} us instead of 0")]
+    /// Time does not start at 0.
+    #[error("time starts at {t_us} us instead of 0")]
     TimeStart {
-        /// Where it begins.
+        /// Time of the first row.
         t_us: u64,
     },
     /// Time does not increase from one row to the next.
-    #[error("time goes from {before_us} us to {t_us} us")]
+    #[error("time does not increase: {before_us} us is followed by {t_us} us")]
     Time {
-        /// The row before.
+        /// Time of the row before.
         before_us: u64,
-        /// This row.
+        /// Time of this row.
         t_us: u64,
     },
+    /// The motors move from one row to the next in less than the period that the plan states.
+    #[error("the motors move within {dt_us} us, less than the stated period of {period_us} us")]
+    Period {
+        /// Time between the two rows.
+        dt_us: u64,
+        /// Period stated by the plan.
+        period_us: u64,
+    },
     /// The pen is down in the first row.
-    #[error("the plan begins with pen {pen} down")]
+    #[error("the plan starts with pen {pen} down")]
     PenAtStart {
         /// The pen.
         pen: u16,
@@ -59,124 +67,124 @@ pub enum Violation {
         pen: u16,
     },
     /// The first row is not the machine's start pose.
-    #[error("the plan begins at {}, {} ticks instead of the start pose {}, {}", found[0], found[1], expected[0], expected[1])]
+    #[error("the plan starts at {}, {} ticks instead of the start pose {}, {}", found[0], found[1], expected[0], expected[1])]
     StartPose {
-        /// The first row's ticks.
+        /// Ticks of the row.
         found: [i64; plan::MOTORS],
         /// The start pose.
         expected: [i64; plan::MOTORS],
     },
-    /// The last row is not the pose in which the plan should park.
-    #[error("the plan ends at {}, {} ticks instead of parking at {}, {}", found[0], found[1], expected[0], expected[1])]
+    /// The last row is not the machine's start pose.
+    #[error("the plan ends at {}, {} ticks instead of the start pose {}, {}", found[0], found[1], expected[0], expected[1])]
     ParkPose {
         /// The last row's ticks.
         found: [i64; plan::MOTORS],
-        /// Where it should park.
+        /// The start pose.
         expected: [i64; plan::MOTORS],
     },
-    /// The first step is faster than a start from rest allows.
+    /// The first step is too fast for a start from rest.
     #[error(
-        "motor {motor} does not start from rest: its first step is {share:.3} times what its acceleration allows"
+        "motor {motor} does not start from rest: its first step needs {share:.3} times the allowed acceleration"
     )]
     RestAtStart {
         /// The motor.
         motor: String,
-        /// Share of the limit with its allowance; above 1.
+        /// Share of the bound; above 1.
         share: f64,
     },
-    /// The last step is faster than a stop afterwards allows.
+    /// The last step is too fast for a stop.
     #[error(
-        "motor {motor} does not end at rest: its last step is {share:.3} times what its acceleration allows"
+        "motor {motor} does not end at rest: its last step needs {share:.3} times the allowed acceleration"
     )]
     RestAtEnd {
         /// The motor.
         motor: String,
-        /// Share of the limit with its allowance; above 1.
+        /// Share of the bound; above 1.
         share: f64,
     },
-    /// A motor is too fast.
+    /// A motor exceeds its speed limit.
     #[error(
-        "motor {motor} runs at {speed_ticks_s:.1} ticks/s where {allowed_ticks_s:.1} are allowed (limit {limit_ticks_s:.1})"
+        "motor {motor}: speed {speed_ticks_s:.1} ticks/s exceeds {allowed_ticks_s:.1} (limit {limit_ticks_s:.1} plus rounding)"
     )]
     Speed {
         /// The motor.
         motor: String,
         /// Its speed, ticks/s.
         speed_ticks_s: f64,
-        /// The limit with the rounding allowance, ticks/s.
+        /// The limit plus the rounding allowance, ticks/s.
         allowed_ticks_s: f64,
         /// The limit itself, ticks/s.
         limit_ticks_s: f64,
     },
-    /// A motor accelerates too hard.
+    /// A motor exceeds its acceleration limit.
     #[error(
-        "motor {motor} accelerates at {acceleration_ticks_s2:.1} ticks/s^2 where {allowed_ticks_s2:.1} are allowed (limit {limit_ticks_s2:.1})"
+        "motor {motor}: acceleration {acceleration_ticks_s2:.1} ticks/s^2 exceeds {allowed_ticks_s2:.1} (limit {limit_ticks_s2:.1} plus rounding)"
     )]
     Acceleration {
         /// The motor.
         motor: String,
         /// Its acceleration, ticks/s².
         acceleration_ticks_s2: f64,
-        /// The limit with the rounding allowance, ticks/s².
+        /// The limit plus the rounding allowance, ticks/s².
         allowed_ticks_s2: f64,
         /// The limit itself, ticks/s².
         limit_ticks_s2: f64,
     },
-    /// A third difference is larger than the jerk limit allows.
+    /// A motor exceeds its jerk limit.
     #[error(
-        "motor {motor} jerks at {jerk_ticks_s3:.1} ticks/s^3 where {allowed_ticks_s3:.1} are allowed (limit {limit_ticks_s3:.1})"
+        "motor {motor}: jerk {jerk_ticks_s3:.1} ticks/s^3 exceeds {allowed_ticks_s3:.1} (limit {limit_ticks_s3:.1} plus rounding)"
     )]
     Jerk {
         /// The motor.
         motor: String,
         /// Its jerk, ticks/s³.
         jerk_ticks_s3: f64,
-        /// The limit with the rounding allowance, ticks/s³.
+        /// The limit plus the rounding allowance, ticks/s³.
         allowed_ticks_s3: f64,
         /// The limit itself, ticks/s³.
         limit_ticks_s3: f64,
     },
-    /// The motors move before the pen has finished its own movement.
+    /// The motors move before the pen has finished its movement.
     #[error("the motors move {early_us} us before pen {pen} has been {motion}")]
     MovesDuringPen {
-        /// What the pen is doing.
+        /// The movement of the pen.
         motion: PenMotion,
         /// The pen.
         pen: u16,
-        /// How much of its time is left.
+        /// Time left until the movement ends.
         early_us: u64,
     },
-    /// A joint leaves its range by more than rounding can explain.
+    /// A joint leaves its range by more than the rounding allowance.
     #[error("{fault}")]
     Joint {
-        /// Which, and by how much.
+        /// The joint and its position.
         fault: Fault,
     },
-    /// Ink of a pen that the drawing does not use.
-    #[error("pen {pen} draws, and the drawing has no stroke of it")]
+    /// Ink of a pen that has no stroke in the drawing.
+    #[error("pen {pen} draws, but the drawing has no stroke of this pen")]
     ForeignPen {
         /// The pen.
         pen: u16,
     },
-    /// Ink too far from the drawing.
+    /// Ink is too far from the drawing.
     #[error(
-        "ink of pen {pen} strays {distance_mm:.4} mm from the drawing {} where {allowed_mm:.4} mm are allowed",
+        "ink of pen {pen} deviates from the drawing by {distance_mm:.4} mm {} (allowed {allowed_mm:.4} mm)",
         stage(*.rounded)
     )]
     Deviates {
         /// The pen.
         pen: u16,
-        /// Whether it is the path of the whole ticks, rather than the one before rounding.
+        /// Whether the path is that of the whole ticks, not the one before rounding.
         rounded: bool,
-        /// How far.
+        /// The distance.
         distance_mm: f64,
-        /// How far it may be.
+        /// The allowed distance.
         allowed_mm: f64,
     },
-    /// A part of the drawing too far from any ink.
+    /// A part of the drawing is too far from all ink.
     #[error(
-        "{uncovered_mm:.2} mm of pen {pen} in {strokes} stroke{} are missed, by {} {distance_mm:.4} mm {} \
-         where {allowed_mm:.4} mm are allowed",
+        "{uncovered_mm:.2} mm of pen {pen} in {strokes} stroke{} are not drawn: the ink is {} \
+         {distance_mm:.4} mm away {} (allowed {allowed_mm:.4} mm)",
         if *.strokes == 1 { "" } else { "s" },
         if *.is_lower_bound { "more than" } else { "up to" },
         stage(*.rounded)
@@ -184,28 +192,28 @@ pub enum Violation {
     Uncovered {
         /// The pen.
         pen: u16,
-        /// Whether it is the path of the whole ticks, rather than the one before rounding.
+        /// Whether the path is that of the whole ticks, not the one before rounding.
         rounded: bool,
-        /// How far the worst place is from ink.
+        /// The largest distance from the ink.
         distance_mm: f64,
-        /// Whether it is only known to be more than that.
+        /// Whether the distance is only a lower bound.
         is_lower_bound: bool,
-        /// How far it may be.
+        /// The allowed distance.
         allowed_mm: f64,
-        /// How much of the drawing is too far; 0 for a dot.
+        /// Length of the part of the drawing that is too far; 0 for a dot.
         uncovered_mm: f64,
-        /// In how many strokes.
+        /// Number of strokes with such a part.
         strokes: u64,
     },
-    /// A row's ticks are not the exact motor position rounded: an error that adds up.
-    #[error("motor {motor} stands {by_ticks:.3} ticks from its exact position, rounding explains 0.5")]
+    /// A row's ticks are not the rounded exact motor position.
+    #[error("motor {motor} is {by_ticks:.3} ticks from its exact position; rounding accounts for 0.5")]
     Drift {
         /// The motor.
         motor: String,
         /// The difference, ticks.
         by_ticks: f64,
     },
-    /// A position or distance that is no finite number.
+    /// A position or distance is not a finite number.
     #[error("a position is not a finite number")]
     NotFinite,
 }
@@ -215,7 +223,7 @@ fn stage(rounded: bool) -> &'static str {
 }
 
 impl Violation {
-    /// Whether it is about a motor's speed, acceleration or jerk, which a plan may be allowed to break on purpose.
+    /// Whether it concerns a motor limit (speed, acceleration, jerk), which a caller may allow to exceed.
     pub fn is_limit(&self) -> bool {
         matches!(
             self,
@@ -228,29 +236,29 @@ impl Violation {
     }
 }
 
-/// Where something is wrong, as far as that is known.
+/// The location of a failure, as far as it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Location {
     /// Row of the table, from 0.
     pub row: Option<u64>,
-    /// Time of that row, microseconds.
+    /// Time of that row, us.
     pub t_us: Option<u64>,
-    /// Point of the machine's plane, mm.
+    /// Point in the machine frame, mm.
     pub point_mm: Option<Point>,
     /// Index of the stroke in the drawing.
     pub stroke: Option<usize>,
-    /// Where the drawing's source says that stroke.
+    /// Byte range of that stroke in the drawing's source.
     pub source: Option<Span>,
 }
 
-/// Something wrong with a plan: what, where it is worst (or first), and how often. `Display` is one sentence.
+/// A failure of a plan: kind, worst or first location, count. `Display` is one sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    /// What.
+    /// The kind.
     pub violation: Violation,
-    /// Where.
+    /// The worst location, or the first one.
     pub location: Location,
-    /// In how many rows, or pieces of path, of this plan; at least 1.
+    /// Number of rows or parts of the path; at least 1.
     pub count: u64,
 }
 
@@ -274,21 +282,21 @@ impl fmt::Display for Failure {
             write!(f, " (bytes {} to {})", source.start, source.end)?;
         }
         if self.count > 1 {
-            write!(f, "; {} times in all", self.count)?;
+            write!(f, "; {} times in total", self.count)?;
         }
         Ok(())
     }
 }
 
-/// Failures as they come in: each kind kept once, with its worst or first location.
+/// Collects failures: each kind is kept once, with its worst or first location.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Failures {
     kept: Vec<(Failure, usize, f64)>,
 }
 
 impl Failures {
-    /// Notes a failure. `which` tells motors apart; of several alike the one of the largest `severity` stays, the
-    /// first of equals.
+    /// Adds a failure. Failures of the same kind and `which` (a motor or pen) are counted, and the one
+    /// with the largest `severity` is kept; of equal ones, the first.
     pub(crate) fn note(&mut self, violation: Violation, which: usize, severity: f64, location: Location) {
         let kind = std::mem::discriminant(&violation);
         let known = self

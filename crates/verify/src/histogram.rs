@@ -1,14 +1,14 @@
-//! Percentiles of a stream, in fixed memory.
+//! Percentiles of a stream in constant memory.
 
-/// A histogram whose bins are 1/64 of a power of two wide: relative resolution 1/64, whatever the range.
+/// A histogram with 64 bins a power of two: a relative resolution of 1/64.
 #[derive(Clone, Debug)]
 pub(crate) struct Histogram {
     weights: Vec<f64>,
 }
 
-/// Mantissa bits that count.
+/// Mantissa bits of the bin number.
 const BITS: u32 = 6;
-/// Smallest value told from 0: 2^-40.
+/// Smallest value distinguished from 0: 2^-40.
 const LOWEST: u64 = (1023 - 40) << BITS;
 /// Bins up to 2^24.
 const BINS: u64 = 64 << BITS;
@@ -20,13 +20,12 @@ impl Histogram {
 
     /// Counts `value` (0 or more) with `weight`.
     pub(crate) fn add(&mut self, value: f64, weight: f64) {
-        // The upper bits of a positive f64 grow with it: exponent, then mantissa.
+        // The bits of a positive `f64` increase with it: exponent, then mantissa.
         let bin = (value.to_bits() >> (52 - BITS)).saturating_sub(LOWEST).min(BINS - 1);
         self.weights[bin as usize] += weight;
     }
 
-    /// A value that at least `share` of the weight does not exceed, and no more than `largest`: the upper edge of the
-    /// bin it falls into.
+    /// An upper bound for at least `share` of the weight: the upper edge of a bin, at most `largest`.
     pub(crate) fn percentile(&self, share: f64, largest: f64) -> f64 {
         let total: f64 = self.weights.iter().sum();
         let mut sum = 0.0;
@@ -54,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_extremes() {
+    fn empty_histogram_and_extreme_values() {
         assert_eq!(Histogram::new().percentile(0.99, 7.0), 7.0);
         let mut histogram = Histogram::new();
         histogram.add(0.0, 99.0);

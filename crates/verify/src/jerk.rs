@@ -1,26 +1,27 @@
-//! One motor's column against its jerk, in third differences of whole ticks.
+//! One motor's column against its jerk limit, in third differences of whole ticks.
 
-use crate::{histogram::Histogram, limits::Excess};
+use crate::{JerkPeak, histogram::Histogram, limits::Excess};
 
-/// Follows one motor from row to row.
+/// Checks one motor row by row.
 ///
-/// For four rows at the times t0 to t3 the third divided difference of the motor's position is a sixth of its jerk somewhere
-/// between. Each tick is half a tick off at most, so with `w_i = Π 1 / |t_i - t_j|` over the other three
+/// For four rows at the times `t0` to `t3` the third divided difference of the position is a sixth of
+/// the jerk at some time between them. Each tick is off by half a tick at most, so with
+/// `w_i = Π 1 / |t_i - t_j|` over the other three rows
 ///
 /// ```text
 /// |Σ ± w_i q_i| <= (j + 3 Σ w_i) / 6             times 6 T³:  |third difference| <= j T³ + 4
 /// ```
 ///
-/// A step longer than the period stands for the rows that were left out of it, on which the motor moves evenly (or not at
-/// all). Before the first row and after the last the motor is at rest.
+/// A step longer than the period replaces omitted rows, between which the motor moves uniformly or
+/// rests. The motor is at rest before the first row and after the last one.
 #[derive(Clone, Debug)]
 pub(crate) struct JerkCheck {
     limit: f64,
     period_s: f64,
-    /// The last three rows: time before the next one's, s, and position, ticks.
+    /// The last three rows: time relative to the last one, s, and position, ticks.
     rows: [(f64, f64); 3],
-    pub(crate) jerk: f64,
-    pub(crate) share: f64,
+    jerk: f64,
+    share: f64,
     shares: Histogram,
 }
 
@@ -31,12 +32,12 @@ impl JerkCheck {
         Self { limit, period_s, rows, jerk: 0.0, share: 0.0, shares: Histogram::new() }
     }
 
-    /// The motor goes by `difference` ticks in `dt_us`; the worst excess on the way.
+    /// The motor moves by `difference` ticks in `dt_us`. Returns the largest excess in this step.
     pub(crate) fn step(&mut self, dt_us: u64, difference: i64) -> Option<Excess> {
         let dt_s = dt_us as f64 * 1e-6;
         let (difference, from) = (difference as f64, self.rows[2].1);
         let mut worst = None;
-        // Of the rows left out only those next to others can be part of a third difference that is not 0.
+        // Of the omitted rows, only the first and last two can enter a third difference that is not 0.
         let omitted = (dt_us as f64 / (self.period_s * 1e6)).round().max(1.0) as u64;
         let near = [1, 2, omitted.saturating_sub(2), omitted.saturating_sub(1)];
         let mut last = 0;
@@ -44,10 +45,10 @@ impl JerkCheck {
             if k > last && k <= omitted {
                 let (step, share) = ((k - last) as f64 / omitted as f64, k as f64 / omitted as f64);
                 last = k;
-                worst = self.to(step * dt_s, from + share * difference, worst);
+                worst = self.add_row(step * dt_s, from + share * difference, worst);
             }
         }
-        // Positions count from here, so that they stay small.
+        // Positions relative to this row, so that they stay small.
         let (_, here) = self.rows[2];
         for row in &mut self.rows {
             row.1 -= here;
@@ -55,19 +56,19 @@ impl JerkCheck {
         worst
     }
 
-    /// The motor stands still from now on.
+    /// The motor is at rest from now on.
     pub(crate) fn stop(&mut self) -> Option<Excess> {
         let mut worst = None;
         for _ in 0..2 {
             let (_, here) = self.rows[2];
-            worst = self.to(self.period_s, here, worst);
+            worst = self.add_row(self.period_s, here, worst);
         }
         worst
     }
 
-    fn to(&mut self, dt_s: f64, position: f64, worst: Option<Excess>) -> Option<Excess> {
+    fn add_row(&mut self, dt_s: f64, position: f64, worst: Option<Excess>) -> Option<Excess> {
         let rows = [self.rows[0], self.rows[1], self.rows[2], (self.rows[2].0 + dt_s, position)];
-        // Times count from here.
+        // Times relative to this row.
         self.rows = [rows[1], rows[2], rows[3]].map(|(t, q)| (t - rows[3].0, q));
         if rows.iter().all(|row| row.1 == rows[0].1) {
             return worst;
@@ -84,7 +85,8 @@ impl JerkCheck {
         self.jerk = self.jerk.max(value);
         self.share = self.share.max(share);
         self.shares.add(share, 1.0);
-        // A limit that is not a number is exceeded by everything. What the divided difference itself costs is forgiven.
+        // `NaN` as a limit is exceeded by every value. The tolerance covers rounding in the divided
+        // difference.
         let within = value <= allowed * (1.0 + 1e-6);
         if within || worst.is_some_and(|worst| worst.share() >= share) {
             return worst;
@@ -92,9 +94,17 @@ impl JerkCheck {
         Some(Excess { value, allowed })
     }
 
-    /// 99.9 % of the rows about which the motor moves have a smaller share.
-    pub(crate) fn share_p999(&self) -> f64 {
-        self.shares.percentile(0.999, self.share)
+    pub(crate) fn peak(self) -> JerkPeak {
+        JerkPeak {
+            jerk_ticks_s3: self.jerk,
+            limit_ticks_s3: self.limit,
+            share_p999: self.shares.percentile(0.999, self.share),
+            share: self.share,
+        }
+    }
+
+    pub(crate) fn limit(&self) -> f64 {
+        self.limit
     }
 }
 
@@ -104,7 +114,7 @@ mod tests {
 
     const PERIOD_US: u64 = 10_000;
 
-    /// 10^7 ticks/s³: at 10 ms 10 + 4 ticks a third difference. The index of the first step that is too sudden.
+    /// 10^7 ticks/s³: at 10 ms 10 + 4 ticks a third difference. The index of the first step in excess.
     fn first_excess(steps: &[(u64, i64)]) -> Option<usize> {
         let mut check = JerkCheck::new(1e7, PERIOD_US);
         for (index, (periods, step)) in steps.iter().enumerate() {
@@ -116,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn third_differences_up_to_fourteen_ticks() {
+    fn third_difference_limit_is_14_ticks() {
         // Steps of 14, 42, 70, ... have second differences of 14, 28, 28, ... and third ones of 14, 14, 0.
         assert_eq!(
             first_excess(&[(1, 14), (1, 42), (1, 70), (1, 84), (1, 84), (1, 70), (1, 42), (1, 14)]),
@@ -124,12 +134,12 @@ mod tests {
         );
         assert_eq!(first_excess(&[(1, 15)]), Some(0));
         assert_eq!(first_excess(&[(1, 14), (1, 43)]), Some(1));
-        // To a sudden end: second differences 7, 7, 1, -15.
+        // A sudden stop: second differences 7, 7, 1, -15.
         assert_eq!(first_excess(&[(1, 7), (1, 14), (1, 15)]), Some(3));
     }
 
     #[test]
-    fn thinned_standstills_and_even_runs_count_as_their_rows() {
+    fn omitted_rows_count_as_rest_or_uniform_motion() {
         for gap in [1, 2, 3, 4, 5, 500] {
             assert_eq!(
                 first_excess(&[(gap, 0), (1, 14), (1, 28), (1, 28), (1, 14), (gap, 0)]),
@@ -139,13 +149,13 @@ mod tests {
             assert_eq!(first_excess(&[(gap, 0), (1, 15)]), Some(1), "{gap}");
             let even = 28 * gap as i64;
             assert_eq!(first_excess(&[(1, 14), (1, 28), (gap, even), (1, 28), (1, 14)]), None, "{gap}");
-            // 28, then 13: second difference -15, where even running was before.
+            // 28, then 13: second difference -15, after uniform motion.
             assert_eq!(first_excess(&[(1, 14), (1, 28), (gap, even), (1, 28), (1, 13)]), Some(4), "{gap}");
         }
     }
 
     #[test]
-    fn a_limit_that_is_no_number_is_broken() {
+    fn nan_limit_is_exceeded() {
         assert!(JerkCheck::new(f64::NAN, 0).step(1, 1).is_some());
     }
 }

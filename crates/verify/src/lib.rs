@@ -1,27 +1,85 @@
-//! The independent verifier: replays a table of motor ticks and certifies what it draws.
+//! The verifier: replays a table of motor ticks and certifies what it draws.
 //!
-//! It knows forward kinematics, the drawing as placed on the machine (mm), and the table; it shares neither code nor
-//! formulas with whatever made the table. Rows are handed in one after the other and forgotten: memory follows the
-//! drawing, not the time of the plot.
+//! Input is the machine, the drawing as placed on the machine (mm), and the table, row by row. With
+//! the planner it shares the machine model (forward kinematics and limits, crate `kinematics`) and
+//! the geometry of strokes (crate `drawing`), and no other code; `tests/replay.rs` of the workspace
+//! checks that model independently, with forward kinematics of its own. Memory depends on the
+//! drawing, not on the duration of the plan.
 //!
 //! ```text
-//! Row --limits--> first and second differences of whole ticks against each motor's speed and acceleration
-//!  \--forward kinematics--> the pen's path --trace--> distance to the drawing's strokes, and theirs to the ink
+//! Row --limits--> first, second, third differences of ticks against the limits of the motors
+//!  \--forward kinematics--> pen path --trace--> distance from ink to drawing, and from drawing to ink
 //! ```
 //!
-//! Every distance is an **upper bound** that is tight to well below the tolerance: what the replay leaves out between
-//! two points (the bulge of an arm's path over its chord, the sagitta of a flattened curve) is added, so a
-//! certificate that holds is a proof. Units: mm, s or whole microseconds, ticks.
+//! All limits are those of the machine. The header of a plan provides the time between rows only;
+//! [`mismatches`] lists where it contradicts the machine.
+//!
+//! Every distance is an **upper bound**, tight to a small part of the tolerance: what the replay
+//! leaves out between two points (chord errors of an arm's path and of curves) is added. Units: mm,
+//! s, us, ticks.
+//!
+//! ```
+//! use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
+//! use kinematics::{Cartesian, Machine, MachineParts, Motor, PenLimits};
+//! use plan::Row;
+//! use verify::{Timing, Violation, certify};
+//!
+//! // A Cartesian machine: 10 ticks/mm, at most 1000 ticks/s and 10,000 ticks/s².
+//! let motors = [Motor::new("x", 10.0, 1e3, 1e4), Motor::new("y", 10.0, 1e3, 1e4)];
+//! let sheet = Rect::new(0.0, 0.0, 100.0, 100.0);
+//! let machine = Machine::new(MachineParts {
+//!     pen: PenLimits {
+//!         max_speed_mm_s: 100.0,
+//!         max_travel_speed_mm_s: f64::INFINITY,
+//!         lift_time_s: 0.1,
+//!         drop_time_s: 0.1,
+//!     },
+//!     ..MachineParts::new("table", Cartesian, motors, sheet)
+//! })?;
+//! // Down, 10 mm along x and back, up. Rows are 0.1 s apart; each step has 50 ticks.
+//! let ends = vec![Point::new(0.0, 0.0), Point::new(10.0, 0.0)];
+//! let stroke = Stroke::polyline(Pen(1), ends, Span::default()).expect("two points");
+//! let drawing = Drawing { strokes: vec![stroke] };
+//! let ticks = [0, 0, 0, 50, 100, 50, 0, 0, 0];
+//! let mut rows: Vec<Row> = (0..9)
+//!     .map(|k| Row { t_us: 100_000 * k, pen: u16::from((1..7).contains(&k)), ticks: [ticks[k as usize], 0] })
+//!     .collect();
+//! let timing = Timing { period_us: 100_000, lift_overlap_us: 0 };
+//! let verify = |rows: &[Row]| {
+//!     certify(&machine, &drawing, timing, 0.1, || rows.iter().map(|row| (*row, None)))
+//! };
+//!
+//! let certificate = verify(&rows);
+//! assert!(certificate.holds, "{:?}", certificate.failures);
+//! assert!((certificate.ink_mm - 20.0).abs() < 1e-9);
+//! assert_eq!(certificate.motors[0].speed_ticks_s, 500.0);
+//!
+//! // One row that is 3 mm off the line: the ink deviates there.
+//! rows[4].ticks[1] = 30;
+//! let certificate = verify(&rows);
+//! assert!(!certificate.holds);
+//! let failure = &certificate.failures[0];
+//! assert!(matches!(failure.violation, Violation::Deviates { pen: 1, .. }), "{failure}");
+//! assert!((certificate.after_rounding.max_mm() - 3.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod certificate;
+mod cover;
 mod failure;
+mod follow;
 mod histogram;
 mod jerk;
 mod limits;
+mod mismatch;
+mod near;
+mod quantization;
+mod run;
 mod target;
 mod trace;
 mod verifier;
 
-pub use certificate::{Certificate, Deviation, DeviationStats, JerkPeak, MotorPeak, TickFloor};
+pub use certificate::{Certificate, Deviation, DeviationStats, JerkPeak, MotorPeak, QuantizationError};
 pub use failure::{Failure, Location, PenMotion, Violation};
-pub use verifier::{ExactRow, Verifier, certify};
+pub use mismatch::{Mismatch, mismatches};
+pub use verifier::{ExactRow, Timing, Verifier, certify};

@@ -1,13 +1,15 @@
-//! One motor's column against its limits, in finite differences of whole ticks.
+//! One motor's column against its speed and acceleration limits, in finite differences of whole ticks.
 
-use crate::{JerkPeak, MotorPeak, histogram::Histogram, jerk::JerkCheck};
+use kinematics::Motor;
 
-/// A finite difference beyond its bound.
+use crate::{JerkPeak, MotorPeak, histogram::Histogram};
+
+/// A finite difference that exceeds its bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Excess {
-    /// The speed or acceleration.
+    /// The speed, acceleration or jerk.
     pub value: f64,
-    /// The limit with the allowance for rounding.
+    /// The limit plus the rounding allowance.
     pub allowed: f64,
 }
 
@@ -17,29 +19,29 @@ impl Excess {
     }
 }
 
-/// Follows one motor from row to row.
+/// Checks one motor row by row.
 ///
-/// Let the motor really follow `q(t)` with `|q'| <= v` and `|q''| <= a`, and let the table hold `q` at the rows' times
-/// to half a tick. Over a step `h` the mean speed `V = (q1 - q0) / h` obeys `|V| <= v`, and the two ticks change it by
-/// `(1/2 + 1/2) / h` at the most:
-///
-/// ```text
-/// |V| <= v + 1/h                                    (1)   times h = T:  |first difference| <= v T + 1
-/// ```
-///
-/// Over two neighbouring steps `h1`, `h2` the divided difference gives `V2 - V1 = q''(somewhere) (h1 + h2) / 2`; the
-/// middle tick enters twice:
+/// Let the motor follow `q(t)` with `|q'| <= v` and `|q''| <= a`, and let the table hold `q` at the
+/// rows to half a tick. Over a step `h` the mean speed `V = (q1 - q0) / h` satisfies `|V| <= v`, and
+/// the two roundings change it by `(1/2 + 1/2) / h` at most:
 ///
 /// ```text
-/// |V2 - V1| <= a (h1 + h2) / 2 + 1/h1 + 1/h2        (2)   times h = T:  |second difference| <= a T^2 + 2
+/// |V| <= v + 1/h                                 (1)  times h = T:  |first difference| <= v T + 1
 /// ```
 ///
-/// A step longer than the period stands for the rows that were left out of it, on which the motor moves evenly
-/// (or not at all): at its ends it counts in (2) as one period at that speed. Before the first row and after the
-/// last the motor is at rest.
+/// Over two neighbouring steps `h1`, `h2` the divided difference is `V2 - V1 = q''(t) (h1 + h2) / 2`
+/// for some `t` between them; the tick in the middle enters twice:
+///
+/// ```text
+/// |V2 - V1| <= a (h1 + h2) / 2 + 1/h1 + 1/h2     (2)  times h = T:  |second difference| <= a T² + 2
+/// ```
+///
+/// A step longer than the period replaces omitted rows, between which the motor moves uniformly or
+/// rests: at its ends it counts in (2) as one period at that speed. The motor is at rest before the
+/// first row and after the last one.
 #[derive(Clone, Debug)]
 pub(crate) struct MotorCheck {
-    motor: plan::Motor,
+    motor: Motor,
     period_s: f64,
     velocity: f64,
     step_s: f64,
@@ -49,20 +51,16 @@ pub(crate) struct MotorCheck {
     acceleration_share: f64,
     speed_shares: Histogram,
     acceleration_shares: Histogram,
-    /// Where the motor states a limit for it.
-    jerk: Option<JerkCheck>,
 }
 
-/// Comparisons forgive what computing the bound itself may cost.
+/// Relative tolerance of comparisons, for rounding in the bound itself.
 const ROUNDING: f64 = 1.0 + 1e-9;
 
 impl MotorCheck {
-    pub(crate) fn new(motor: plan::Motor, period_us: u64) -> Self {
+    pub(crate) fn new(motor: Motor, period_us: u64) -> Self {
         let period_s = period_us.max(1) as f64 * 1e-6;
-        let jerk = motor.limits.jerk.map(|limit| JerkCheck::new(limit, period_us));
         Self {
             motor,
-            jerk,
             period_s,
             velocity: 0.0,
             step_s: period_s,
@@ -75,17 +73,14 @@ impl MotorCheck {
         }
     }
 
-    pub(crate) fn name(&self) -> &str {
-        &self.motor.name
-    }
-
-    /// The motor goes by `difference` ticks in `dt_us`: too fast by (1), and too sudden at the step's beginning by (2).
+    /// The motor moves by `difference` ticks in `dt_us`. Returns the excess of (1) in this step, and
+    /// of (2) at its beginning.
     pub(crate) fn step(&mut self, dt_us: u64, difference: i64) -> (Option<Excess>, Option<Excess>) {
         let dt_s = dt_us as f64 * 1e-6;
         let velocity = difference as f64 / dt_s;
         let mut fast = None;
         if difference != 0 {
-            let allowed = self.motor.limits.speed + 1.0 / dt_s;
+            let allowed = self.motor.max_speed_ticks_s + 1.0 / dt_s;
             let value = velocity.abs();
             let share = value / allowed;
             self.speed = self.speed.max(value);
@@ -93,15 +88,15 @@ impl MotorCheck {
             self.speed_shares.add(share, 1.0);
             fast = exceeds(value, allowed);
         }
-        (fast, self.turn(velocity, dt_s.min(self.period_s)))
+        (fast, self.change_velocity(velocity, dt_s.min(self.period_s)))
     }
 
-    /// The motor stands still from now on.
+    /// The motor is at rest from now on.
     pub(crate) fn stop(&mut self) -> Option<Excess> {
-        self.turn(0.0, self.period_s)
+        self.change_velocity(0.0, self.period_s)
     }
 
-    fn turn(&mut self, velocity: f64, step_s: f64) -> Option<Excess> {
+    fn change_velocity(&mut self, velocity: f64, step_s: f64) -> Option<Excess> {
         let (before, step_before) = (self.velocity, self.step_s);
         (self.velocity, self.step_s) = (velocity, step_s);
         if before == 0.0 && velocity == 0.0 {
@@ -109,7 +104,7 @@ impl MotorCheck {
         }
         let mean_s = 0.5 * (step_before + step_s);
         let value = (velocity - before).abs() / mean_s;
-        let allowed = self.motor.limits.acceleration + (1.0 / step_before + 1.0 / step_s) / mean_s;
+        let allowed = self.motor.max_acceleration_ticks_s2 + (1.0 / step_before + 1.0 / step_s) / mean_s;
         let share = value / allowed;
         self.acceleration = self.acceleration.max(value);
         self.acceleration_share = self.acceleration_share.max(share);
@@ -117,42 +112,23 @@ impl MotorCheck {
         exceeds(value, allowed)
     }
 
-    /// The same motion against the motor's jerk.
-    pub(crate) fn jerk(&mut self, dt_us: u64, difference: i64) -> Option<Excess> {
-        self.jerk.as_mut().and_then(|jerk| jerk.step(dt_us, difference))
-    }
-
-    /// The stop against the motor's jerk.
-    pub(crate) fn jerk_of_stop(&mut self) -> Option<Excess> {
-        self.jerk.as_mut().and_then(JerkCheck::stop)
-    }
-
-    pub(crate) fn limits(&self) -> plan::Limits {
-        self.motor.limits
-    }
-
-    pub(crate) fn peak(self) -> MotorPeak {
+    pub(crate) fn peak(self, jerk: Option<JerkPeak>) -> MotorPeak {
         MotorPeak {
             speed_share_p999: self.speed_shares.percentile(0.999, self.speed_share),
             acceleration_share_p999: self.acceleration_shares.percentile(0.999, self.acceleration_share),
-            jerk: self.jerk.map(|jerk| JerkPeak {
-                jerk_ticks_s3: jerk.jerk,
-                limit_ticks_s3: self.motor.limits.jerk.unwrap_or_default(),
-                share: jerk.share,
-                share_p999: jerk.share_p999(),
-            }),
+            jerk,
             name: self.motor.name,
             speed_ticks_s: self.speed,
             acceleration_ticks_s2: self.acceleration,
-            speed_limit_ticks_s: self.motor.limits.speed,
-            acceleration_limit_ticks_s2: self.motor.limits.acceleration,
+            speed_limit_ticks_s: self.motor.max_speed_ticks_s,
+            acceleration_limit_ticks_s2: self.motor.max_acceleration_ticks_s2,
             speed_share: self.speed_share,
             acceleration_share: self.acceleration_share,
         }
     }
 }
 
-/// A limit that is not a number is exceeded by everything.
+/// `NaN` as a limit is exceeded by every value.
 fn exceeds(value: f64, allowed: f64) -> Option<Excess> {
     let within = value <= allowed * ROUNDING;
     (!within).then_some(Excess { value, allowed })
@@ -160,17 +136,28 @@ fn exceeds(value: f64, allowed: f64) -> Option<Excess> {
 
 #[cfg(test)]
 mod tests {
-    use super::MotorCheck;
+    use super::{Motor, MotorCheck};
 
     const PERIOD_US: u64 = 10_000;
 
-    /// 10,000 ticks/s and 100,000 ticks/s²: at 10 ms 100 + 1 ticks a step and 10 + 2 ticks a second difference.
-    fn motor() -> MotorCheck {
-        let limits = plan::Limits { speed: 1e4, acceleration: 1e5, jerk: None };
-        MotorCheck::new(plan::Motor { name: "m".into(), limits }, PERIOD_US)
+    fn with_limits(max_speed_ticks_s: f64, max_acceleration_ticks_s2: f64) -> Motor {
+        Motor {
+            name: "m".into(),
+            ticks_per_unit: 1.0,
+            offset_ticks: 0.0,
+            max_speed_ticks_s,
+            max_acceleration_ticks_s2,
+            max_jerk_ticks_s3: None,
+        }
     }
 
-    /// Steps of one period each, then rest; whether any is too fast, and the first one that is too sudden.
+    /// 10,000 ticks/s and 100,000 ticks/s²: at 10 ms 100 + 1 ticks a step and 10 + 2 ticks a second
+    /// difference.
+    fn motor() -> MotorCheck {
+        MotorCheck::new(with_limits(1e4, 1e5), PERIOD_US)
+    }
+
+    /// Steps of one period each, then rest: whether (1) is exceeded, and the first step that exceeds (2).
     fn run(steps: &[i64]) -> (bool, Option<usize>) {
         let mut motor = motor();
         let mut fast = false;
@@ -184,18 +171,18 @@ mod tests {
     }
 
     #[test]
-    fn second_differences_up_to_twelve_ticks() {
+    fn second_difference_limit_is_12_ticks() {
         assert_eq!(run(&[12, 24, 36, 24, 12]), (false, None));
         assert_eq!(run(&[-12, 0, 12]), (false, None));
         assert_eq!(run(&[13, 25, 13]), (false, Some(0)));
         assert_eq!(run(&[12, 25, 13, 1]), (false, Some(1)));
         assert_eq!(run(&[12, 24, 13]), (false, Some(3)));
-        // To and fro: 24 ticks, though no step is longer than a tick a millisecond.
+        // Back and forth: a second difference of 24 ticks.
         assert_eq!(run(&[12, -12]), (false, Some(1)));
     }
 
     #[test]
-    fn first_differences_up_to_a_hundred_and_one_ticks() {
+    fn first_difference_limit_is_101_ticks() {
         let ramp = |top: i64| {
             (1..=8).map(|k| 12 * k).chain([top]).chain((1..=8).rev().map(|k| 12 * k)).collect::<Vec<_>>()
         };
@@ -204,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thinned_standstill_is_no_gentle_stop() {
+    fn omitted_rows_at_rest_do_not_soften_a_stop() {
         for gap in [1, 2, 500] {
             let mut motor = motor();
             assert!(motor.step(PERIOD_US, 12).1.is_none());
@@ -215,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thinned_even_run_counts_as_its_rows() {
+    fn omitted_rows_of_uniform_motion_count() {
         let mut motor = motor();
         for step in [12, 24, 36] {
             assert_eq!(motor.step(PERIOD_US, step), (None, None));
@@ -225,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn short_steps_are_judged_by_mean_speeds() {
+    fn short_steps_use_mean_speeds() {
         let mut motor = motor();
         assert_eq!(motor.step(PERIOD_US, 12), (None, None));
         // 4 ms: 1e5 (10 + 4) ms / 2 + 1/10 ms + 1/4 ms = 1050 ticks/s more than 1200, so 9 ticks.
@@ -234,9 +221,8 @@ mod tests {
     }
 
     #[test]
-    fn limits_that_are_no_numbers_are_broken() {
-        let limits = plan::Limits { speed: f64::NAN, acceleration: f64::NAN, jerk: None };
-        let mut motor = MotorCheck::new(plan::Motor { name: "m".into(), limits }, 0);
+    fn nan_limits_are_exceeded() {
+        let mut motor = MotorCheck::new(with_limits(f64::NAN, f64::NAN), 0);
         let (fast, sudden) = motor.step(1, 1);
         assert!(fast.is_some() && sudden.is_some());
     }

@@ -1,41 +1,43 @@
-//! The drawing as the verifier sees it: straight pieces by pen, each divided into cells, in a tree of boxes.
+//! The drawing as the verifier uses it: straight pieces by pen, divided into cells, in a bounding box tree.
 
 use drawing::{Drawing, Point, Rect, Segment, Span, Vec2};
 
-/// Curves are replaced by chords within this share of the tolerance; the difference is added to what is measured.
+/// Chord error of flattened curves, as a share of the tolerance. It is added to what is measured.
 const FLATNESS: f64 = 1.0 / 500.0;
 
-/// Cells are this share of the tolerance long.
+/// Length of a cell, as a share of the tolerance.
 const CELL: f64 = 1.0 / 4.0;
 
-/// No more cells than this (and one a piece): from there on they grow, and only their middles are looked at.
+/// Largest number of cells, plus one a piece. Above it, cells are longer and only their middles are
+/// sampled.
 const MAX_CELLS: f64 = (1_u32 << 24) as f64;
 
-/// Longer lines are cut into pieces of about this length, mm, so that boxes about slanted ones stay small,
+/// Longer lines are cut into pieces of about this length, mm, so that the bounding boxes of slanted
+/// lines stay small.
 const LONGEST_PIECE: f64 = 8.0;
 
-/// but into no more pieces than this.
+/// Largest number of pieces made by that.
 const MAX_CUTS: f64 = 500_000.0;
 
-/// How many cells of a piece are looked at together.
+/// Number of cells of a piece that are examined together.
 pub(crate) const BLOCK: usize = 16;
 
-/// How many children a box of the tree has.
+/// Number of children of a box of the tree.
 const FAN: usize = 8;
 
-/// A straight piece of a stroke, in a frame of its own: a point of the plane is (along, across) from `start`.
+/// A straight piece of a stroke with its own frame: coordinates (along, across) from `start`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     start: Point,
-    /// Unit vector; any for a dot.
+    /// Unit vector; arbitrary for a dot.
     along: Vec2,
     /// 0 for a dot.
     pub(crate) length: f64,
-    /// How far the stroke itself may be from this piece, mm: 0 for what was drawn straight.
+    /// Chord error of this piece, mm; 0 for lines.
     pub(crate) error: f64,
     /// Index of its first cell.
     pub(crate) first_cell: u32,
-    /// How many equal cells it is divided into; at least 1.
+    /// Number of equal cells; at least 1.
     pub(crate) cells: u32,
     /// Index of its first block of [`BLOCK`] cells.
     pub(crate) first_block: u32,
@@ -51,18 +53,19 @@ impl Piece {
         Self { start, along, length, error, first_cell: 0, cells: 1, first_block: 0, stroke: stroke as u32 }
     }
 
-    /// `p` in the piece's frame: how far along it, and how far to its left.
+    /// `p` in the frame of the piece: along it, and to its left.
     pub(crate) fn local(&self, p: Point) -> (f64, f64) {
         let v = p - self.start;
         (v.dot(self.along), self.along.cross(v))
     }
 
-    /// The point so far along.
+    /// The point at the coordinate `along`.
     pub(crate) fn at(&self, along: f64) -> Point {
         self.start + along * self.along
     }
 
-    /// Distance from a point in the piece's frame to the stroke: an upper bound, off by 2 `error` at most.
+    /// Upper bound of the distance from a point in the piece's frame to the stroke; overstated by at most
+    /// `2 error`.
     pub(crate) fn distance(&self, (along, across): (f64, f64)) -> f64 {
         let beyond = along - along.clamp(0.0, self.length);
         (beyond * beyond + across * across).sqrt() + self.error
@@ -74,8 +77,8 @@ impl Piece {
         [self.distance(self.local(points[0])), self.distance(self.local(points[1]))]
     }
 
-    /// Whether a line may come within `radius` of the stroke: no if both its ends lie beyond that to one side of the
-    /// piece's line, or both before its start or both behind its end.
+    /// Whether a line may come within `radius` of the stroke. It does not if both its ends are beyond the
+    /// radius on the same side of the piece, before its start or after its end.
     #[inline]
     pub(crate) fn may_be_near(&self, from: Point, to: Point, radius: f64) -> bool {
         let ((x0, y0), (x1, y1)) = (self.local(from), self.local(to));
@@ -89,10 +92,6 @@ impl Piece {
     pub(crate) fn bounds(&self) -> Rect {
         Rect::from_points(self.start, self.at(self.length))
     }
-}
-
-fn distance(a: Point, b: Point) -> f64 {
-    libm::hypot(b.x - a.x, b.y - a.y)
 }
 
 /// Whether two boxes have a point in common.
@@ -114,7 +113,7 @@ pub(crate) struct PenTarget {
     pub(crate) pieces: Vec<Piece>,
     /// Their indices by location, see [`by_position`].
     order: Vec<u32>,
-    /// `levels[0][i]` bounds the pieces that `order` names from `FAN * i` on, `levels[k + 1][i]` the boxes of
+    /// `levels[0][i]` bounds the pieces `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the boxes of
     /// `levels[k]` likewise; the last level is one box.
     levels: Vec<Vec<Rect>>,
 }
@@ -135,7 +134,7 @@ impl PenTarget {
         Self { pen, pieces, order, levels }
     }
 
-    /// Calls `to` with the index and the box of every piece whose box meets `bounds`.
+    /// Calls `to` with the index and bounding box of every piece whose box meets `bounds`.
     pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32, Rect)) {
         let mut open = vec![(self.levels.len() - 1, 0)];
         while let Some((level, index)) = open.pop() {
@@ -172,7 +171,7 @@ impl PenTarget {
                 for i in children.take_while(|i| *i < self.levels[level - 1].len()) {
                     open.push((distance_to_box(p, self.levels[level - 1][i]), level - 1, i));
                 }
-                // The nearest box is opened first.
+                // The nearest box is visited first.
                 open[first..].sort_by(|a, b| b.0.total_cmp(&a.0));
             } else {
                 for &i in &self.order[children.start..children.end.min(self.order.len())] {
@@ -188,7 +187,8 @@ impl PenTarget {
     }
 }
 
-/// The pieces' indices along a Morton (Z-order) curve through their middles, so that neighbours share boxes.
+/// The indices of the pieces along a Morton (Z-order) curve through their midpoints, so that neighbours
+/// share boxes.
 fn by_position(pieces: &[Piece]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
     let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return order };
@@ -213,13 +213,13 @@ fn by_position(pieces: &[Piece]) -> Vec<u32> {
 pub(crate) struct Target {
     /// Sorted by pen; none is empty.
     pub(crate) pens: Vec<PenTarget>,
-    /// Where the source says each stroke.
+    /// Byte range of each stroke in the source.
     pub(crate) sources: Vec<Span>,
-    /// How many cells there are in all.
+    /// Number of cells.
     pub(crate) cells: usize,
-    /// How many blocks of cells.
+    /// Number of blocks of cells.
     pub(crate) blocks: usize,
-    /// Longest cell, if only their middles are looked at; otherwise 0.
+    /// Length of the longest cell if only their middles are sampled, otherwise 0.
     pub(crate) sparse_mm: f64,
     /// Strokes with coordinates that are not finite.
     pub(crate) broken: Vec<usize>,
@@ -241,7 +241,7 @@ impl Target {
                 let mut from = segment.start();
                 segment.flatten(flatness, |to| {
                     if to != from {
-                        let cuts = (distance(from, to) / longest).ceil().max(1.0);
+                        let cuts = (libm::hypot(to.x - from.x, to.y - from.y) / longest).ceil().max(1.0);
                         let at = |k: f64| if k < cuts { from.lerp(to, k / cuts) } else { to };
                         for k in 0..cuts as usize {
                             pieces.push(Piece::new(at(k as f64), at(k as f64 + 1.0), error, index));

@@ -1,27 +1,29 @@
-//! Row by row: what the table says about time, pen and poses, and the two paths it draws.
+//! Row by row: what the table says about time, pen and poses, and the two paths that it draws.
 
 use drawing::{Drawing, Point};
 use kinematics::{JointPos, Machine, MotorPos};
 use plan::{Header, MOTORS, Row};
 
 use crate::{
-    Certificate, Deviation, Location, PenMotion, TickFloor, Violation,
+    Certificate, Deviation, Location, PenMotion, Violation,
     failure::Failures,
+    jerk::JerkCheck,
     limits::{Excess, MotorCheck},
+    quantization::Quantization,
+    run::At,
     target::Target,
-    trace::{At, Trace},
+    trace::Trace,
 };
 
-/// An arm's path between two rows is followed by chords within this share of the tolerance; the rest is added.
-const BULGE: f64 = 1.0 / 200.0;
-/// Chords between two rows, at most; what is left of the bulge is added all the same.
+/// Chord error with which the pen's path between two rows is followed, as a share of the tolerance.
+/// It is added to what is measured.
+const CHORD_ERROR: f64 = 1.0 / 200.0;
+/// Largest number of chords between two rows. A larger chord error is still added.
 const MOST_CHORDS: f64 = 10_000.0;
-/// The tick floor is evaluated again whenever the pen has drawn so far, mm.
-const FLOOR_STEP: f64 = 0.5;
-/// What computing a distance may cost, mm and as a share.
+/// Allowance for rounding in a computed distance: mm, and as a share.
 const ROUNDING: (f64, f64) = (1e-9, 1e-6);
 
-/// Where the motors hold the pen.
+/// Motor positions as joint positions and pen position.
 #[derive(Clone, Copy, Debug)]
 struct Pose {
     joints: JointPos,
@@ -36,7 +38,7 @@ struct Previous {
     exact: Option<Pose>,
 }
 
-/// Time that the pen needs for its own movement.
+/// A movement of the pen itself.
 #[derive(Clone, Copy, Debug)]
 struct PenEvent {
     motion: PenMotion,
@@ -44,48 +46,69 @@ struct PenEvent {
     until_us: u64,
 }
 
-/// Replays a plan row by row; see the crate's documentation.
+/// What a verifier takes from a plan's header. All limits are those of the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// Time between two rows while a motor moves, us.
+    pub period_us: u64,
+    /// Part of the lift time in which the motors may already travel, us.
+    pub lift_overlap_us: u64,
+}
+
+impl From<&Header> for Timing {
+    fn from(header: &Header) -> Self {
+        Self { period_us: header.period_us, lift_overlap_us: header.lift_overlap_us }
+    }
+}
+
+/// Replays a plan row by row; see the documentation of the crate.
 #[derive(Clone, Debug)]
 pub struct Verifier<'a> {
     machine: &'a Machine,
     tolerance: f64,
-    park: [i64; MOTORS],
-    /// How far half a tick on every motor may carry each joint out of its range.
+    timing: Timing,
+    /// Ticks of the start pose, where a plan starts and ends.
+    start: [i64; MOTORS],
+    /// Joint displacement of half a tick on every motor: allowed beyond the joint limits.
     joint_slack: JointPos,
     target: Target,
     motors: [MotorCheck; MOTORS],
+    /// For motors with a jerk limit.
+    jerk: [Option<JerkCheck>; MOTORS],
     failures: Failures,
     rows: u64,
     previous: Option<Previous>,
     event: Option<PenEvent>,
-    /// For how much of a lift's time the header lets the motors travel.
-    lift_overlap_us: u64,
     pens: Vec<u16>,
     follows: bool,
+    /// The path of the whole ticks.
     after: Trace,
+    /// The path of the exact motor positions.
     before: Option<Trace>,
     largest_rounding: f64,
-    floor: Floor,
+    quantization: Quantization,
     travel_mm: f64,
     pen_downs: u64,
 }
 
-/// A row, and the motor positions it was rounded from where they are known.
+/// A row, and the motor positions it was rounded from if they are known.
 pub type ExactRow = (Row, Option<[f64; MOTORS]>);
 
-/// Certifies a whole table, whose rows can be had more than once: measured fast at first, and once more in full if it
-/// does not hold, so that no good plan is refused.
+/// Certifies a whole table whose rows can be generated twice.
 ///
-/// Arguments are those of [`Verifier::new`]; `rows` begins anew at each call.
+/// The first measurement is fast and may fail a good plan where many strokes are close; if it fails,
+/// the table is measured again in full. Arguments are those of [`Verifier::new`]; `rows` starts from
+/// the beginning at each call.
 pub fn certify<I: Iterator<Item = ExactRow>>(
     machine: &Machine,
     drawing: &Drawing,
-    header: &Header,
+    timing: impl Into<Timing>,
     tolerance_mm: f64,
     mut rows: impl FnMut() -> I,
 ) -> Certificate {
+    let timing = timing.into();
     let mut measure = |follows: bool| {
-        let mut verifier = Verifier::with(machine, drawing, header, tolerance_mm, follows);
+        let mut verifier = Verifier::with(machine, drawing, timing, tolerance_mm, follows);
         rows().for_each(|(row, exact)| verifier.row(row, exact));
         verifier.finish()
     };
@@ -94,21 +117,29 @@ pub fn certify<I: Iterator<Item = ExactRow>>(
 }
 
 impl<'a> Verifier<'a> {
-    /// A verifier for one plan of `drawing` (as placed, machine mm) on `machine`. `header` gives the period and the
-    /// motors' limits; `tolerance_mm` is what the plan claims to keep.
-    pub fn new(machine: &'a Machine, drawing: &Drawing, header: &Header, tolerance_mm: f64) -> Self {
-        Self::with(machine, drawing, header, tolerance_mm, false)
+    /// A verifier for one plan of `drawing` (as placed, machine mm) on `machine`.
+    ///
+    /// The limits of motors, joints and pen are those of `machine`. `timing` is taken from the plan,
+    /// and checked against its rows. `tolerance_mm` is the deviation that the plan may have.
+    pub fn new(
+        machine: &'a Machine,
+        drawing: &Drawing,
+        timing: impl Into<Timing>,
+        tolerance_mm: f64,
+    ) -> Self {
+        Self::with(machine, drawing, timing.into(), tolerance_mm, false)
     }
 
-    /// The same; if it `follows`, crowded drawings are measured faster, and what fails may yet be good.
+    /// With `follows`, crowded drawings are measured faster, and a failure may be wrong.
     fn with(
         machine: &'a Machine,
         drawing: &Drawing,
-        header: &Header,
+        timing: Timing,
         tolerance_mm: f64,
         follows: bool,
     ) -> Self {
-        // Lengths follow the tolerance; without a sensible one the plan is still measured, and cannot hold.
+        // Resolutions depend on the tolerance. A plan with an unusable one is still measured, but
+        // cannot hold.
         let scale = if tolerance_mm > 1e-6 { tolerance_mm.min(1e3) } else { 1e-6 };
         let target = Target::new(drawing, scale);
         let start = machine.motor_positions(&machine.start());
@@ -123,33 +154,33 @@ impl<'a> Verifier<'a> {
         Self {
             machine,
             tolerance: tolerance_mm,
-            park: [start[0].round() as i64, start[1].round() as i64],
+            timing,
+            start: [start[0].round() as i64, start[1].round() as i64],
             joint_slack: half_tick[0].abs() + half_tick[1].abs(),
-            motors: header.motors.clone().map(|motor| MotorCheck::new(motor, header.period_us)),
+            motors: machine.motors().clone().map(|motor| MotorCheck::new(motor, timing.period_us)),
+            jerk: machine
+                .motors()
+                .each_ref()
+                .map(|motor| motor.max_jerk_ticks_s3.map(|limit| JerkCheck::new(limit, timing.period_us))),
             failures,
             rows: 0,
             previous: None,
             event: None,
-            lift_overlap_us: header.lift_overlap_us,
             pens: Vec::new(),
             follows,
             after: Trace::new(&target, scale, machine.quantization_error(&machine.start()), follows),
             before: None,
             target,
             largest_rounding: 0.0,
-            floor: Floor::default(),
+            quantization: Quantization::default(),
             travel_mm: 0.0,
             pen_downs: 0,
         }
     }
 
-    /// Lets the plan end at `ticks` instead of the machine's start pose.
-    pub fn allow_park(&mut self, ticks: [i64; MOTORS]) {
-        self.park = ticks;
-    }
-
-    /// The next row, and the motor positions it was rounded from where the caller has them. They should come with every
-    /// row or with none: the path before rounding is measured only as long as all rows have them.
+    /// Adds the next row, and the motor positions that it was rounded from if they are known.
+    ///
+    /// The path before rounding is measured only if all rows come with exact positions.
     pub fn row(&mut self, row: Row, exact: Option<[f64; MOTORS]>) {
         let index = self.rows;
         self.rows += 1;
@@ -213,27 +244,22 @@ impl<'a> Verifier<'a> {
 
     fn check_rounding(&mut self, row: Row, exact: Option<[f64; MOTORS]>, here: Location) {
         let Some(exact) = exact else { return };
-        for (index, motor) in self.motors.iter().enumerate() {
-            let by = (row.ticks[index] as f64 - exact[index]).abs();
-            self.largest_rounding = self.largest_rounding.max(by);
-            if by > 0.5 + 1e-6 {
-                self.failures.note(
-                    Violation::Drift { motor: motor.name().to_owned(), by_ticks: by },
-                    index,
-                    by,
-                    here,
-                );
+        for motor in 0..MOTORS {
+            let by_ticks = (row.ticks[motor] as f64 - exact[motor]).abs();
+            self.largest_rounding = self.largest_rounding.max(by_ticks);
+            if by_ticks > 0.5 + 1e-6 {
+                let violation = Violation::Drift { motor: self.motor_name(motor), by_ticks };
+                self.failures.note(violation, motor, by_ticks, here);
             }
         }
     }
 
     fn first(&mut self, current: &Previous, here: Location) {
-        let start = self.machine.motor_positions(&self.machine.start());
-        let expected = [start[0].round() as i64, start[1].round() as i64];
         let Row { pen, ticks: found, .. } = current.row;
-        if found != expected {
+        if found != self.start {
             let location = Location { point_mm: Some(current.ticks.point), ..here };
-            self.failures.note(Violation::StartPose { found, expected }, 0, 0.0, location);
+            let violation = Violation::StartPose { found, expected: self.start };
+            self.failures.note(violation, 0, 0.0, location);
         }
         if pen != 0 {
             self.failures.note(Violation::PenAtStart { pen }, 0, 0.0, here);
@@ -257,31 +283,11 @@ impl<'a> Verifier<'a> {
         for motor in 0..MOTORS {
             let difference = row.ticks[motor].saturating_sub(before.ticks[motor]);
             moves |= difference != 0;
-            let (fast, sudden) = self.motors[motor].step(dt_us, difference);
-            if let Some(excess) = fast {
-                let limit = self.motors[motor].limits().speed;
-                let violation = Violation::Speed {
-                    motor: self.motors[motor].name().to_owned(),
-                    speed_ticks_s: excess.value,
-                    allowed_ticks_s: excess.allowed,
-                    limit_ticks_s: limit,
-                };
-                self.failures.note(violation, motor, excess.share(), here);
-            }
-            if let Some(excess) = sudden {
-                let violation = if previous.index == 0 {
-                    Violation::RestAtStart {
-                        motor: self.motors[motor].name().to_owned(),
-                        share: excess.share(),
-                    }
-                } else {
-                    self.acceleration(motor, excess)
-                };
-                self.failures.note(violation, motor, excess.share(), here);
-            }
-            if let Some(excess) = self.motors[motor].jerk(dt_us, difference) {
-                self.failures.note(self.jerk(motor, excess), motor, excess.share(), here);
-            }
+            self.check_limits(motor, dt_us, difference, here);
+        }
+        if moves && dt_us < self.timing.period_us {
+            let violation = Violation::Period { dt_us, period_us: self.timing.period_us };
+            self.failures.note(violation, 0, 1.0 / dt_us as f64, here);
         }
         if let Some(event) = self.event.filter(|event| moves && before.t_us < event.until_us) {
             let early_us = event.until_us - before.t_us;
@@ -297,7 +303,7 @@ impl<'a> Verifier<'a> {
         }
         let at = At { row: previous.index, t_us: before.t_us };
         if moves {
-            self.draw_floor(&current.ticks);
+            self.update_quantization(&current.ticks);
             draw(&mut self.after, &self.target, self.machine, &previous.ticks, &current.ticks, at);
         }
         if let (Some(trace), Some(from), Some(to)) = (&mut self.before, &previous.exact, &current.exact) {
@@ -305,31 +311,57 @@ impl<'a> Verifier<'a> {
         }
     }
 
-    fn acceleration(&self, motor: usize, excess: Excess) -> Violation {
-        Violation::Acceleration {
-            motor: self.motors[motor].name().to_owned(),
-            acceleration_ticks_s2: excess.value,
-            allowed_ticks_s2: excess.allowed,
-            limit_ticks_s2: self.motors[motor].limits().acceleration,
+    /// One motor's step against its limits.
+    fn check_limits(&mut self, motor: usize, dt_us: u64, difference: i64, here: Location) {
+        let (fast, sudden) = self.motors[motor].step(dt_us, difference);
+        if let Some(excess) = fast {
+            let violation = Violation::Speed {
+                motor: self.motor_name(motor),
+                speed_ticks_s: excess.value,
+                allowed_ticks_s: excess.allowed,
+                limit_ticks_s: self.machine.motors()[motor].max_speed_ticks_s,
+            };
+            self.failures.note(violation, motor, excess.share(), here);
         }
+        if let Some(excess) = sudden {
+            let violation = if here.row == Some(0) {
+                Violation::RestAtStart { motor: self.motor_name(motor), share: excess.share() }
+            } else {
+                Violation::Acceleration {
+                    motor: self.motor_name(motor),
+                    acceleration_ticks_s2: excess.value,
+                    allowed_ticks_s2: excess.allowed,
+                    limit_ticks_s2: self.machine.motors()[motor].max_acceleration_ticks_s2,
+                }
+            };
+            self.failures.note(violation, motor, excess.share(), here);
+        }
+        let excess = self.jerk[motor].as_mut().and_then(|jerk| jerk.step(dt_us, difference));
+        self.note_jerk(motor, excess, here);
     }
 
-    fn jerk(&self, motor: usize, excess: Excess) -> Violation {
-        Violation::Jerk {
-            motor: self.motors[motor].name().to_owned(),
+    fn note_jerk(&mut self, motor: usize, excess: Option<Excess>, here: Location) {
+        let (Some(excess), Some(jerk)) = (excess, &self.jerk[motor]) else { return };
+        let violation = Violation::Jerk {
+            motor: self.motor_name(motor),
             jerk_ticks_s3: excess.value,
             allowed_ticks_s3: excess.allowed,
-            limit_ticks_s3: self.motors[motor].limits().jerk.unwrap_or_default(),
+            limit_ticks_s3: jerk.limit(),
+        };
+        self.failures.note(violation, motor, excess.share(), here);
+    }
+
+    fn motor_name(&self, motor: usize) -> String {
+        self.machine.motors()[motor].name.clone()
+    }
+
+    fn update_quantization(&mut self, pose: &Pose) {
+        if self.quantization.follow(self.machine, &pose.joints, pose.point) {
+            self.after.widen(self.quantization.worst_mm());
         }
     }
 
-    fn draw_floor(&mut self, pose: &Pose) {
-        if self.floor.follow(self.machine, pose) {
-            self.after.widen(self.floor.worst_mm);
-        }
-    }
-
-    /// The pen that holds from this row on.
+    /// Handles a change of the pen at this row.
     fn pen(&mut self, before: u16, current: &Previous) {
         let (pen, t_us) = (current.row.pen, current.row.t_us);
         if pen == before {
@@ -341,12 +373,12 @@ impl<'a> Verifier<'a> {
             (0, _) => (PenMotion::Drop, lift.drop_time_s),
             _ => (PenMotion::Change, lift.lift_time_s + lift.drop_time_s),
         };
-        // A planner may have cut the time to whole microseconds; 150000 must not become 150001 by a rounding error.
+        // Whole microseconds, rounded down: a rounding error must not make 150001 of 150000.
         let time_us = (time_s * 1e6 + 1e-3).floor() as u64;
-        let overlap_us = if motion == PenMotion::Lift { self.lift_overlap_us } else { 0 };
+        let overlap_us = if motion == PenMotion::Lift { self.timing.lift_overlap_us } else { 0 };
         let until_us = t_us.saturating_add(time_us.saturating_sub(overlap_us));
         self.event = Some(PenEvent { motion, pen: if pen == 0 { before } else { pen }, until_us });
-        self.lift();
+        self.end_strokes();
         if pen == 0 {
             return;
         }
@@ -354,8 +386,8 @@ impl<'a> Verifier<'a> {
         if !self.pens.contains(&pen) {
             self.pens.push(pen);
         }
-        self.floor.begin(self.machine, &current.ticks);
-        self.after.widen(self.floor.worst_mm);
+        self.quantization.begin(self.machine, &current.ticks.joints, current.ticks.point);
+        self.after.widen(self.quantization.worst_mm());
         let at = At { row: current.index, t_us };
         let Some(target) = self.target.pen(pen) else {
             let location = Location {
@@ -373,24 +405,24 @@ impl<'a> Verifier<'a> {
         }
     }
 
-    fn lift(&mut self) {
+    fn end_strokes(&mut self) {
         self.after.up(&self.target);
         if let Some(trace) = &mut self.before {
             trace.up(&self.target);
         }
     }
 
-    /// What the rows add up to, the last one having been handed in.
+    /// The certificate, after the last row.
     pub fn finish(mut self) -> Certificate {
-        self.lift();
+        self.end_strokes();
         match self.previous {
             None => self.failures.note(Violation::Empty, 0, 0.0, Location::default()),
             Some(last) => self.last(&last),
         }
-        let tick_floor = self.floor.result();
+        let quantization_error = self.quantization.result();
         let allowed = |mm: f64| mm * (1.0 + ROUNDING.1) + ROUNDING.0;
         let before_allowed = self.tolerance;
-        let after_allowed = self.tolerance + tick_floor.worst_mm;
+        let after_allowed = self.tolerance + quantization_error.worst_mm;
         let before_rounding = self.before.take().map(|trace| {
             let deviation =
                 deviation(&trace, &self.target, &mut self.failures, before_allowed, &allowed, false);
@@ -401,6 +433,9 @@ impl<'a> Verifier<'a> {
         let ink = before_rounding.as_ref().map_or(&self.after, |(_, trace)| trace);
         let (ink_mm, dots) = (ink.length, ink.dots);
         let failures = self.failures.into_vec();
+        let jerk = self.jerk;
+        let mut peaks = jerk.map(|jerk| jerk.map(JerkCheck::peak)).into_iter();
+        let motors = self.motors.map(|motor| motor.peak(peaks.next().flatten()));
         Certificate {
             holds: failures.is_empty(),
             failures,
@@ -408,9 +443,9 @@ impl<'a> Verifier<'a> {
             largest_rounding_ticks: before_rounding.as_ref().map(|_| self.largest_rounding),
             before_rounding: before_rounding.map(|(deviation, _)| deviation),
             after_rounding,
-            tick_floor,
+            quantization_error,
             pens: self.pens,
-            motors: self.motors.map(MotorCheck::peak),
+            motors,
             rows: self.rows,
             duration_us: self.previous.map_or(0, |last| last.row.t_us),
             ink_mm,
@@ -429,38 +464,37 @@ impl<'a> Verifier<'a> {
         };
         for motor in 0..MOTORS {
             if let Some(excess) = self.motors[motor].stop() {
-                let name = self.motors[motor].name().to_owned();
-                let violation = Violation::RestAtEnd { motor: name, share: excess.share() };
+                let violation = Violation::RestAtEnd { motor: self.motor_name(motor), share: excess.share() };
                 self.failures.note(violation, motor, excess.share(), here);
             }
-            if let Some(excess) = self.motors[motor].jerk_of_stop() {
-                self.failures.note(self.jerk(motor, excess), motor, excess.share(), here);
-            }
+            let excess = self.jerk[motor].as_mut().and_then(JerkCheck::stop);
+            self.note_jerk(motor, excess, here);
         }
         let Row { pen, ticks: found, .. } = last.row;
         if pen != 0 {
             self.failures.note(Violation::PenAtEnd { pen }, 0, 0.0, here);
         }
-        if found != self.park {
-            self.failures.note(Violation::ParkPose { found, expected: self.park }, 0, 0.0, here);
+        if found != self.start {
+            self.failures.note(Violation::ParkPose { found, expected: self.start }, 0, 0.0, here);
         }
     }
 }
 
-/// Follows the pen while every motor moves evenly from one pose to the other.
+/// Follows the pen while both motors move linearly from one pose to the other.
 ///
-/// The joints then move evenly too. Over the whole step the path's second derivative is `B = bend(from, to)` long at the
-/// most; over one of `n` equal parts it is `B / n²`, and the path leaves that part's chord by `B / (8 n²)` at the most.
+/// The joints then move linearly too. Over the whole step the second derivative of the path is at most
+/// `B = second_derivative_bound(from, to)`; over one of `n` equal parts it is `B / n²`, so the chord
+/// error of that part is at most `B / (8 n²)`.
 fn draw(trace: &mut Trace, target: &Target, machine: &Machine, from: &Pose, to: &Pose, at: At) {
     let geometry = machine.mechanism();
-    let bulge = geometry.second_derivative_bound(&from.joints, &to.joints) / 8.0;
-    let allowed = trace.tolerance() * BULGE;
-    if bulge <= allowed {
-        trace.to(target, to.point, bulge, at);
+    let chord_error = geometry.second_derivative_bound(&from.joints, &to.joints) / 8.0;
+    let allowed = trace.tolerance() * CHORD_ERROR;
+    if chord_error <= allowed {
+        trace.to(target, to.point, chord_error, at);
         return;
     }
-    let parts = (bulge / allowed).sqrt().ceil().min(MOST_CHORDS);
-    let error = bulge / (parts * parts);
+    let parts = (chord_error / allowed).sqrt().ceil().min(MOST_CHORDS);
+    let error = chord_error / (parts * parts);
     for part in 1..parts as usize {
         let joints = from.joints + (to.joints - from.joints) * (part as f64 / parts);
         trace.to(target, geometry.forward(&joints), error, at);
@@ -468,7 +502,7 @@ fn draw(trace: &mut Trace, target: &Target, machine: &Machine, from: &Pose, to: 
     trace.to(target, to.point, error, at);
 }
 
-/// Measures one path in full and notes what is beyond the allowed distance.
+/// The deviation of one path; notes failures beyond the allowed distance.
 fn deviation(
     trace: &Trace,
     target: &Target,
@@ -479,7 +513,7 @@ fn deviation(
 ) -> Deviation {
     let limit = forgive(allowed_mm);
     if let Some((pen, distance_mm, location)) = trace.worst_ink(target) {
-        // Not a number is not within the limit either.
+        // NaN is not within the limit.
         let within = distance_mm <= limit;
         if !within {
             let violation = Violation::Deviates { pen, rounded, distance_mm, allowed_mm };
@@ -500,49 +534,4 @@ fn deviation(
         failures.note(violation, 2 * usize::from(part.pen) + usize::from(rounded), 0.0, part.location);
     }
     Deviation { ink_to_drawing: trace.ink_to_drawing(), drawing_to_ink }
-}
-
-/// The tick floor along the ink, evaluated every half millimetre.
-#[derive(Clone, Debug, Default)]
-struct Floor {
-    at: Option<Point>,
-    worst_mm: f64,
-    squares: f64,
-    weight: f64,
-}
-
-impl Floor {
-    /// The pen goes down here.
-    fn begin(&mut self, machine: &Machine, pose: &Pose) {
-        // A dot counts for something, but next to nothing beside ink that has a length.
-        self.add(machine, pose, 1e-6);
-    }
-
-    /// The pen has drawn up to here; whether the floor was evaluated.
-    fn follow(&mut self, machine: &Machine, pose: &Pose) -> bool {
-        let Some(point) = self.at else { return false };
-        let gone = libm::hypot(pose.point.x - point.x, pose.point.y - point.y);
-        if gone < FLOOR_STEP {
-            return false;
-        }
-        self.add(machine, pose, gone);
-        true
-    }
-
-    fn add(&mut self, machine: &Machine, pose: &Pose, weight: f64) {
-        let worst = machine.quantization_error(&pose.joints);
-        let square: f64 = [MotorPos::new(1.0, 0.0), MotorPos::new(0.0, 1.0)]
-            .map(|tick| machine.mechanism().pen_velocity(&pose.joints, &machine.joint_rates(&tick)).hypot2())
-            .iter()
-            .sum();
-        self.at = Some(pose.point);
-        self.worst_mm = self.worst_mm.max(worst);
-        self.squares += weight * square / 12.0;
-        self.weight += weight;
-    }
-
-    fn result(&self) -> TickFloor {
-        let mean = if self.weight > 0.0 { self.squares / self.weight } else { 0.0 };
-        TickFloor { worst_mm: self.worst_mm, rms_mm: mean.sqrt() }
-    }
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Plotter, arm, cartesian, header, polar};
+use common::{Plotter, arm, cartesian, polar, timing};
 use drawing::{Drawing, EllipticArc, Pen, Point, Span, Stroke, Vec2};
 use kinematics::{Machine, MotorPos};
 use plan::Row;
@@ -89,7 +89,7 @@ fn flattened(drawing: &Drawing) -> Lines {
 }
 
 fn certify(machine: &Machine, drawing: &Drawing, rows: &[(u16, [f64; 2])]) -> Certificate {
-    let mut verifier = Verifier::new(machine, drawing, &header(machine), TOLERANCE);
+    let mut verifier = Verifier::new(machine, drawing, timing(), TOLERANCE);
     for (index, (pen, exact)) in rows.iter().enumerate() {
         let ticks = exact.map(|ticks| ticks.round() as i64);
         verifier.row(Row { t_us: 10_000 * index as u64, pen: *pen, ticks }, Some(*exact));
@@ -289,13 +289,15 @@ fn the_tick_floor_of_the_first_arm() {
     // Near full stretch (462 mm), where both links' errors add up.
     let stroke: &[(f64, f64)] = &[(0.0, 461.9), (20.0, 461.4)];
     let mut plotter = Plotter::new(&machine);
-    let floor = plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).tick_floor;
+    let floor =
+        plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).quantization_error;
     assert!((floor.worst_mm - 0.4536).abs() < 2e-4, "{floor:?}");
     assert!((floor.rms_mm - 0.186).abs() < 5e-4, "{floor:?}");
     // At 328.6 mm from the base the links stand across each other.
     let stroke: &[(f64, f64)] = &[(100.0, 313.0), (101.0, 312.7)];
     let mut plotter = Plotter::new(&machine);
-    let floor = plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).tick_floor;
+    let floor =
+        plotter.stroke(1, stroke).park().verify(&common::drawing(&[(1, stroke)]), 0.1).quantization_error;
     assert!((floor.worst_mm - 0.3226).abs() < 1e-3, "{floor:?}");
     assert!((floor.rms_mm - 0.186).abs() < 5e-4, "{floor:?}");
 }

@@ -222,8 +222,8 @@ impl CertificateReport {
             before_rounding: certificate.before_rounding.as_ref().map(DeviationReport::of),
             after_rounding: Some(DeviationReport::of(&certificate.after_rounding)),
             tick_floor: TickFloor {
-                worst_mm: certificate.tick_floor.worst_mm,
-                rms_mm: certificate.tick_floor.rms_mm,
+                worst_mm: certificate.quantization_error.worst_mm,
+                rms_mm: certificate.quantization_error.rms_mm,
             },
             largest_rounding_ticks: certificate.largest_rounding_ticks,
             pens: certificate.pens.clone(),

@@ -111,7 +111,7 @@ fn details(certificate: &Certificate) -> String {
     let _ = writeln!(
         text,
         "  drawing resolution of this machine here (half a tick): {:.4} mm worst, {:.4} mm RMS",
-        certificate.tick_floor.worst_mm, certificate.tick_floor.rms_mm
+        certificate.quantization_error.worst_mm, certificate.quantization_error.rms_mm
     );
     for peak in &certificate.motors {
         let _ = write!(

@@ -1,4 +1,4 @@
-//! Machines made by hand, and a plotter that writes tick tables for them without any planner.
+//! Test machines, and a generator of tick tables that uses no planner.
 
 #![allow(dead_code, unreachable_pub, reason = "each test uses its own part")]
 
@@ -7,9 +7,9 @@ use kinematics::{
     Cartesian, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits, Polar, TwoLink,
 };
 use plan::{Header, Limits, Row};
-use verify::{Certificate, Verifier};
+use verify::{Certificate, Timing, Verifier};
 
-/// Time between rows, microseconds.
+/// Time between rows, us.
 pub const PERIOD_US: u64 = 10_000;
 
 fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration: f64) -> Motor {
@@ -56,7 +56,7 @@ pub fn cartesian() -> Machine {
     Machine::new(parts).expect("a sound machine")
 }
 
-/// Seed 1's arm: both motors on the base, 3200 ticks a turn, stretched upwards at the start.
+/// The coaxial arm (report 1): both motors on the base, 3200 ticks a turn, stretched up at the start.
 pub fn arm() -> Machine {
     let counts = 3200.0 / std::f64::consts::TAU;
     let up = std::f64::consts::FRAC_PI_2;
@@ -71,6 +71,7 @@ pub fn polar() -> Machine {
     Machine::new(parts("polar", Polar, motors, JointPos::new(0.5, 60.0))).expect("a sound machine")
 }
 
+/// The header of a plan for a machine.
 pub fn header(machine: &Machine) -> Header {
     Header {
         machine: machine.name().into(),
@@ -79,7 +80,7 @@ pub fn header(machine: &Machine) -> Header {
             limits: Limits {
                 speed: motor.max_speed_ticks_s,
                 acceleration: motor.max_acceleration_ticks_s2,
-                jerk: None,
+                jerk: motor.max_jerk_ticks_s3,
             },
         }),
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
@@ -90,7 +91,11 @@ pub fn header(machine: &Machine) -> Header {
     }
 }
 
-/// A drawing of polylines, one source byte a stroke.
+pub fn timing() -> Timing {
+    Timing { period_us: PERIOD_US, lift_overlap_us: 0 }
+}
+
+/// A drawing of polylines; stroke `i` has the source byte `i`.
 pub fn drawing(strokes: &[(u16, &[(f64, f64)])]) -> Drawing {
     let strokes = strokes.iter().enumerate().filter_map(|(index, (pen, points))| {
         let points = points.iter().map(|(x, y)| Point::new(*x, *y)).collect();
@@ -99,7 +104,7 @@ pub fn drawing(strokes: &[(u16, &[(f64, f64)])]) -> Drawing {
     Drawing { strokes: strokes.collect() }
 }
 
-/// Writes rows: straight lines of the pen, each from rest to rest by `s = 3 u² - 2 u³`.
+/// Generates rows: straight lines of the pen, each from rest to rest with `s = 3 u² - 2 u³`.
 #[derive(Clone)]
 pub struct Plotter<'a> {
     pub machine: &'a Machine,
@@ -107,7 +112,7 @@ pub struct Plotter<'a> {
     pub exact: Vec<[f64; 2]>,
     pub period_us: u64,
     /// Speed of the motors as a share of their limits.
-    pub haste: f64,
+    pub limit_share: f64,
     joints: JointPos,
 }
 
@@ -118,7 +123,7 @@ impl<'a> Plotter<'a> {
             rows: Vec::new(),
             exact: Vec::new(),
             period_us: PERIOD_US,
-            haste: 0.95,
+            limit_share: 0.95,
             joints: machine.start(),
         };
         plotter.push(0, 0);
@@ -142,10 +147,10 @@ impl<'a> Plotter<'a> {
         self
     }
 
-    /// Puts the pen down or lifts it, and waits.
+    /// Lowers or lifts the pen, and waits.
     pub fn pen(&mut self, pen: u16) -> &mut Self {
         let last = self.rows.len() - 1;
-        // The first row belongs to the pen being up.
+        // In the first row the pen is up.
         if last == 0 {
             self.rest(self.period_us as f64 * 1e-6);
         }
@@ -155,20 +160,20 @@ impl<'a> Plotter<'a> {
         self.rest(if pen == 0 { lift_time } else { drop_time })
     }
 
-    /// Poses along a path, `u` from 0 to 1, as fast as the motors allow.
+    /// Follows a path, `u` from 0 to 1, as fast as the motors allow.
     fn follow(&mut self, path: impl Fn(f64) -> JointPos) -> &mut Self {
         let ticks = |u: f64| self.machine.motor_positions(&path(u * u * (3.0 - 2.0 * u)));
         let dt = self.period_us as f64 * 1e-6;
         let too_fast = |steps: usize| {
             let at = |k: usize| ticks((k as f64 / steps as f64).min(1.0));
             (0..steps).any(|k| {
-                // Before the first step the pen may have come from where it goes.
+                // Mirrored before the first step: a start from rest.
                 let (a, b, c) = (at(k.abs_diff(1)), at(k), at(k + 1));
                 (0..2).any(|m| {
                     let motor = &self.machine.motors()[m];
-                    (c[m] - b[m]).abs() > self.haste * motor.max_speed_ticks_s * dt
+                    (c[m] - b[m]).abs() > self.limit_share * motor.max_speed_ticks_s * dt
                         || (c[m] - 2.0 * b[m] + a[m]).abs()
-                            > self.haste * motor.max_acceleration_ticks_s2 * dt * dt
+                            > self.limit_share * motor.max_acceleration_ticks_s2 * dt * dt
                 })
             })
         };
@@ -190,14 +195,14 @@ impl<'a> Plotter<'a> {
         self
     }
 
-    /// Straight on paper.
+    /// A straight line of the pen.
     pub fn line(&mut self, x: f64, y: f64) -> &mut Self {
         let from = self.machine.mechanism().forward(&self.joints);
         let (machine, near, to) = (self.machine, self.joints, Point::new(x, y));
         self.follow(|u| machine.pose_near(from.lerp(to, u), &near).expect("a point within reach"))
     }
 
-    /// Straight in the joints.
+    /// A straight line in joint space.
     pub fn travel(&mut self, x: f64, y: f64) -> &mut Self {
         let to = self.machine.pose_near(Point::new(x, y), &self.joints).expect("a point within reach");
         self.travel_to(to)
@@ -225,8 +230,8 @@ impl<'a> Plotter<'a> {
     }
 
     pub fn verify_as(&self, drawing: &Drawing, tolerance: f64, exact: bool) -> Certificate {
-        let header = Header { period_us: self.period_us, ..header(self.machine) };
-        let mut verifier = Verifier::new(self.machine, drawing, &header, tolerance);
+        let timing = Timing { period_us: self.period_us, lift_overlap_us: 0 };
+        let mut verifier = Verifier::new(self.machine, drawing, timing, tolerance);
         for (index, row) in self.rows.iter().enumerate() {
             verifier.row(*row, exact.then(|| self.exact[index]));
         }
@@ -234,7 +239,7 @@ impl<'a> Plotter<'a> {
     }
 }
 
-/// One line a failure.
+/// The messages of all failures.
 pub fn sentences(certificate: &Certificate) -> Vec<String> {
     certificate.failures.iter().map(ToString::to_string).collect()
 }
