@@ -20,7 +20,8 @@ use verify::{Timing, Verifier};
 fn cartesian() -> Option<Machine> {
     let motors = ["x", "y"].map(|name| Motor::new(name, 100.0, 1e4, 1e5));
     let sheet = Rect::new(0.0, 0.0, 200.0, 200.0);
-    Machine::new(MachineParts::new("cartesian", Cartesian, motors, sheet)).ok()
+    let parts = MachineParts::new("cartesian", Cartesian, motors, sheet);
+    Machine::new(MachineParts { start: JointPos::ZERO, ..parts }).ok()
 }
 
 /// The coaxial arm (report 1), with 3200 `factor` ticks a turn.

@@ -20,7 +20,7 @@
 //!
 //! ```
 //! use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
-//! use kinematics::{Cartesian, Machine, MachineParts, Motor, PenLimits};
+//! use kinematics::{Cartesian, JointPos, Machine, MachineParts, Motor, PenLimits};
 //! use plan::Row;
 //! use verify::{Timing, Violation, certify};
 //!
@@ -34,6 +34,7 @@
 //!         lift_time_s: 0.1,
 //!         drop_time_s: 0.1,
 //!     },
+//!     start: JointPos::ZERO,
 //!     ..MachineParts::new("table", Cartesian, motors, sheet)
 //! })?;
 //! // Down, 10 mm along x and back, up. Rows are 0.1 s apart; each step has 50 ticks.

@@ -244,8 +244,8 @@ impl<'a> Verifier<'a> {
 
     fn check_rounding(&mut self, row: Row, exact: Option<[f64; MOTORS]>, here: Location) {
         let Some(exact) = exact else { return };
-        for motor in 0..MOTORS {
-            let by_ticks = (row.ticks[motor] as f64 - exact[motor]).abs();
+        for (motor, (ticks, exact)) in row.ticks.into_iter().zip(exact).enumerate() {
+            let by_ticks = (ticks as f64 - exact).abs();
             self.largest_rounding = self.largest_rounding.max(by_ticks);
             if by_ticks > 0.5 + 1e-6 {
                 let violation = Violation::Drift { motor: self.motor_name(motor), by_ticks };

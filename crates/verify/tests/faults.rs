@@ -216,7 +216,7 @@ fn jerk_5_percent_above_the_limit() {
     let peak = certificate.motors[0].jerk.expect("x has a jerk limit");
     assert!(peak.share < 1e-3 && peak.share_p999 <= peak.share, "{peak:?}");
     // The allowance is four ticks a period cubed.
-    let hardest = peak.jerk_ticks_s3 - 4.0 / 0.01_f64.powi(3);
+    let hardest = peak.jerk_ticks_s3 - 4e6;
     let certificate = verify_rows(&limited(hardest / 1.05), &plotter);
     let (violation, sentence) = only(&certificate);
     assert!(matches!(violation, Violation::Jerk { motor, .. } if motor == "x"), "{sentence}");
