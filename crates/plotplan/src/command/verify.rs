@@ -1,9 +1,12 @@
 //! `plotplan verify`: the certificate, recomputed from the plan's ticks.
+//!
+//! The machine decides: its limits, joints and pen times are verified, never those that the plan
+//! states. Where the two differ, that is reported.
 
 use anyhow::Context as _;
 use compiler::machine_file::MachineFile;
-use compiler::replay;
 use compiler::report::{CertificateReport, text};
+use compiler::{import, replay};
 use drawing::Affine;
 use plan::file::PlanFile;
 use serde_json::json;
@@ -13,7 +16,7 @@ use crate::failure::Failure;
 use crate::input::{self, Input, LoadedMachine};
 use crate::{output, terminal};
 
-/// What plans are made for when nothing else is said.
+/// The tolerance of plans that state none.
 const DEFAULT_TOLERANCE_MM: f64 = 0.1;
 
 pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
@@ -22,10 +25,13 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     }
     let input = input::read(&arguments.plan)?;
     let (plan, machine) = plan(&input, arguments.machine.as_deref())?;
+    let mut mismatches: Vec<String> =
+        verify::mismatches(&machine.machine, &plan.table.header).iter().map(ToString::to_string).collect();
     let drawing = match &arguments.drawing {
         None => None,
         Some(file) => {
             let input = input::read(file)?;
+            mismatches.extend(other_drawing(&plan, &input));
             let mut drawing = input::drawing(&input, &arguments.reading)?.drawing().clone();
             drawing.transform(Affine::new(plan.table.header.placement));
             Some(drawing)
@@ -34,6 +40,9 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
     let certificate = replay::certify(&plan, &machine.machine, drawing.as_ref(), tolerance);
+    if arguments.report == ReportForm::Text {
+        mismatches.iter().for_each(|mismatch| terminal::warning(mismatch));
+    }
     let text = match (arguments.report, drawing.is_some()) {
         (ReportForm::Text, true) => text::certificate(&certificate),
         (ReportForm::Text, false) => {
@@ -43,11 +52,23 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
         (ReportForm::Json, compared) => {
             let report =
                 if compared { CertificateReport::of } else { CertificateReport::of_motion }(&certificate);
-            format!("{}\n", json!({ "certificate": report }))
+            format!("{}\n", json!({ "certificate": report, "mismatches": mismatches }))
         }
     };
     output::write("-", |out| out.write_all(text.as_bytes()))?;
     if certificate.holds { Ok(()) } else { Err(Failure::Refused) }
+}
+
+/// Reports a drawing that is not the one that the plan document names, by its SHA-256.
+fn other_drawing(plan: &PlanFile, drawing: &Input) -> Option<String> {
+    let stated = &plan.document.as_ref()?.source.sha256;
+    let found = import::sha256(&drawing.bytes);
+    (!stated.eq_ignore_ascii_case(&found)).then(|| {
+        format!(
+            "{} is not the drawing that the plan was made from: SHA-256 {found}, in the plan {stated}",
+            drawing.name
+        )
+    })
 }
 
 /// Reads a plan and finds its machine: the one named on the command line, the one in the plan document, or the preset of
