@@ -5,33 +5,90 @@
 
 use std::io::Write;
 
-use crate::command::{Instant, rests};
-use crate::{Unfit, WriteError};
+use crate::setpoint::{Setpoint, at_rest};
+use plan::Header;
 use plan::file::text::Text;
 
-/// Writes a plan with a line every `period_us`.
+use crate::backend::{Backend, EncodeOptions, PenNumbers, PlanSource};
+use crate::{Unrepresentable, WriteError};
+
+/// LinuxCNC's halstreamer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halstreamer;
+
+impl Backend for Halstreamer {
+    fn name(&self) -> &'static str {
+        "halstreamer"
+    }
+
+    fn format_help(&self) -> Option<&'static str> {
+        Some("Columns for LinuxCNC's halstreamer")
+    }
+
+    fn pens(&self) -> PenNumbers {
+        PenNumbers::Dropped
+    }
+
+    fn caveat(&self, header: &Header) -> Option<String> {
+        let period_us = header.period_us;
+        (period_us != 1000).then(|| {
+            format!(
+                "a line is one period of the streamer's thread, here {period_us} us; --period 1ms suits the usual servo thread"
+            )
+        })
+    }
+
+    fn needs_machine(&self) -> bool {
+        true
+    }
+
+    fn write(
+        &self,
+        plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        let period_us = plan.header().period_us;
+        check(plan.setpoints(self.name())?, period_us)?;
+        write(plan.setpoints(self.name())?, period_us, out)
+    }
+}
+
+/// Whether rows are whole periods apart, and one period where the motors move.
+fn check(setpoints: impl Iterator<Item = Setpoint>, period_us: u64) -> Result<(), Unrepresentable> {
+    let mut before: Option<Setpoint> = None;
+    for (row, setpoint) in (0..).zip(setpoints) {
+        if let Some(last) = before {
+            let duration_us = setpoint.row.t_us - last.row.t_us;
+            let periods = duration_us / period_us.max(1);
+            if periods * period_us != duration_us || periods > 1 && !at_rest(&last, &setpoint) {
+                return Err(Unrepresentable::Uneven { row, period_us });
+            }
+        }
+        before = Some(setpoint);
+    }
+    Ok(())
+}
+
+/// Writes a plan that passed [`check`], with a line every `period_us`.
 ///
 /// # Errors
-/// Rows that are not whole periods apart; whatever the writer says.
-pub fn write<W: Write + ?Sized>(
-    instants: impl IntoIterator<Item = Instant>,
+/// An error of the writer.
+fn write<W: Write + ?Sized>(
+    setpoints: impl IntoIterator<Item = Setpoint>,
     period_us: u64,
     out: &mut W,
 ) -> Result<(), WriteError> {
     let mut text = Text::new(out);
-    let mut before: Option<Instant> = None;
-    for (row, instant) in (0..).zip(instants) {
+    let mut before: Option<Setpoint> = None;
+    for setpoint in setpoints {
         if let Some(last) = before {
-            let lasts = instant.row.t_us - last.row.t_us;
-            let periods = lasts / period_us.max(1);
-            if periods * period_us != lasts || periods > 1 && !rests(&last, &instant) {
-                return Err(Unfit::Uneven { row, period_us }.into());
-            }
+            let periods = (setpoint.row.t_us - last.row.t_us) / period_us.max(1);
             for _ in 0..periods {
                 line(&mut text, &last)?;
             }
         }
-        before = Some(instant);
+        before = Some(setpoint);
     }
     if let Some(last) = before {
         line(&mut text, &last)?;
@@ -39,8 +96,8 @@ pub fn write<W: Write + ?Sized>(
     Ok(text.finish()?)
 }
 
-fn line<W: Write + ?Sized>(text: &mut Text<'_, W>, instant: &Instant) -> Result<(), WriteError> {
-    text.fixed(instant.exact[0]).byte(b' ').fixed(instant.exact[1]).byte(b' ');
-    text.int(u8::from(instant.row.pen != 0)).byte(b'\n').flush_if_full()?;
+fn line<W: Write + ?Sized>(text: &mut Text<'_, W>, setpoint: &Setpoint) -> Result<(), WriteError> {
+    text.fixed(setpoint.exact_ticks[0]).byte(b' ').fixed(setpoint.exact_ticks[1]).byte(b' ');
+    text.int(u8::from(setpoint.row.pen != 0)).byte(b'\n').flush_if_full()?;
     Ok(())
 }

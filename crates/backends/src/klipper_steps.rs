@@ -9,13 +9,43 @@ use std::io::Write;
 
 use plan::Row;
 
-use crate::{Unfit, WriteError};
 use plan::file::text::Text;
 
+use crate::backend::{Backend, EncodeOptions, PenNumbers, PlanSource};
+use crate::{Unrepresentable, WriteError};
+
+/// Step commands of Klipper's micro-controllers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct KlipperSteps;
+
+impl Backend for KlipperSteps {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn format_help(&self) -> Option<&'static str> {
+        Some("Klipper's step commands")
+    }
+
+    fn pens(&self) -> PenNumbers {
+        PenNumbers::Dropped
+    }
+
+    fn write(
+        &self,
+        plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        check(plan.rows())?;
+        write(plan.rows(), out)
+    }
+}
+
 /// The format's name.
-pub const NAME: &str = "klipper-steps";
+const NAME: &str = "klipper-steps";
 /// The clock that the intervals count, ticks a second.
-pub const CLOCK_HZ: u64 = 16_000_000;
+const CLOCK_HZ: u64 = 16_000_000;
 /// Intervals are shorter than this, clock ticks; `check_line` of Klipper's host demands it.
 const LONGEST: u64 = 1 << 31;
 /// `count` has 16 bits.
@@ -60,19 +90,40 @@ impl Stepper {
     }
 }
 
-/// Writes a plan: both steppers' commands, each in the order of time, and the pen's.
+/// The clock at a time of the plan.
+fn clock_of(t_us: u64) -> u64 {
+    t_us * (CLOCK_HZ / 1_000_000)
+}
+
+/// Whether no two steps of a motor fall on one clock tick.
+fn check(rows: impl Iterator<Item = Row>) -> Result<(), Unrepresentable> {
+    let mut before: Option<Row> = None;
+    for (index, row) in (0..).zip(rows) {
+        if let Some(last) = before {
+            let us = row.t_us - last.t_us;
+            let steps = [0, 1].map(|motor| row.ticks[motor].abs_diff(last.ticks[motor]));
+            if let Some(steps) = steps.into_iter().find(|steps| *steps >= clock_of(us)) {
+                let (format, most) = (NAME, CLOCK_HZ);
+                return Err(Unrepresentable::TooFast { row: index, steps, us, format, most });
+            }
+        }
+        before = Some(row);
+    }
+    Ok(())
+}
+
+/// Writes a plan that passed [`check`]: both steppers' commands, each in the order of time, and the pen's.
 ///
 /// # Errors
-/// When two steps of a motor fall on one clock tick; whatever the writer says.
-pub fn write<W: Write + ?Sized>(rows: impl IntoIterator<Item = Row>, out: &mut W) -> Result<(), WriteError> {
+/// An error of the writer.
+fn write<W: Write + ?Sized>(rows: impl IntoIterator<Item = Row>, out: &mut W) -> Result<(), WriteError> {
     let mut text = Text::new(out);
     text.str("# clock_hz: ").int(CLOCK_HZ).str("\n# stepper oid 0 and 1, pen oid 2\n");
     text.str("reset_step_clock oid=0 clock=0\nreset_step_clock oid=1 clock=0\n");
     let mut steppers = [0, 1].map(|oid| Stepper { oid, clock: 0, forward: None, run: None });
     let mut before: Option<Row> = None;
     let mut down = false;
-    let clock_of = |t_us: u64| t_us * (CLOCK_HZ / 1_000_000);
-    for (index, row) in (0_u64..).zip(rows) {
+    for row in rows {
         if let Some(last) = before {
             if (last.pen != 0) != down {
                 down = last.pen != 0;
@@ -85,17 +136,6 @@ pub fn write<W: Write + ?Sized>(rows: impl IntoIterator<Item = Row>, out: &mut W
             for (motor, stepper) in steppers.iter_mut().enumerate() {
                 let steps = row.ticks[motor] - last.ticks[motor];
                 let count = steps.unsigned_abs();
-                if count >= to - from {
-                    let us = row.t_us - last.t_us;
-                    return Err(Unfit::TooFast {
-                        row: index,
-                        steps: count,
-                        us,
-                        format: NAME,
-                        most: CLOCK_HZ,
-                    }
-                    .into());
-                }
                 if count > 0 && stepper.forward != Some(steps > 0) {
                     stepper.flush(&mut text);
                     stepper.forward = Some(steps > 0);

@@ -1,32 +1,70 @@
-//! Firmwares: what plans become for each, how to send it, and an emulated device to try it on.
+//! Backends: what plans become for each firmware, how they are sent, and an emulated device to test senders with.
+//!
+//! One folder (or file) a firmware, each with an implementation of [`Backend`]; [`ALL`] lists them. The command line, the
+//! documentation's tables and the conformance tests are made from that list. [`transmission`] holds the strategies that
+//! sessions share; they know no firmware.
 
-pub mod asking;
-pub mod blind;
-pub mod c_arrays;
-pub mod coaxial_commands;
-mod command;
-pub mod conversation;
-pub mod device;
-pub mod ebb;
+mod backend;
+mod coaxial;
+mod device;
+mod ebb;
 mod error;
-pub mod gcode;
-pub mod halstreamer;
-pub mod ink;
-pub mod joint_trajectory;
-pub mod klipper_steps;
-pub mod locating;
-pub mod numbered;
-pub mod polar_csv;
-mod polar_points;
-pub mod pvt;
-pub mod repeating;
+mod fault_injection;
+mod gcode;
+mod halstreamer;
+mod ink;
+mod joint_trajectory;
+mod klipper_steps;
+mod polar;
+mod position_query;
+pub mod program;
+mod pvt;
 mod retime;
-pub mod script;
+mod session;
+mod setpoint;
 pub mod simulate;
-pub mod xy_serial;
+pub mod status;
+mod tick_lines;
+pub mod transmission;
+mod xy_serial;
 
-pub use command::{Command, Instant};
-pub use conversation::{Conversation, Outcome, Progress};
-pub use error::{Unfit, WriteError};
+pub use backend::{
+    Backend, EmulatorOptions, EncodeOptions, InkFrame, Loss, PenActuator, PenNumbers, PlanSource, RowIter,
+    SessionOptions,
+};
+pub use device::{Device, Port};
+pub use error::{Unrepresentable, WriteError};
+pub use fault_injection::{Fault, FaultInjector};
 pub use ink::Ink;
-pub use script::{Dialect, Script, ScriptError, Step};
+pub use position_query::{PositionQuery, ReportedPosition};
+pub use program::{Line, Program, ProgramError};
+pub use session::{Outcome, Progress, Session};
+pub use setpoint::Setpoint;
+
+/// Every backend, in the order of the command line's help.
+pub const ALL: &[&dyn Backend] = &[
+    &tick_lines::Answered,
+    &coaxial::Commands::Ticks,
+    &coaxial::Commands::Inches,
+    &xy_serial::XySerial,
+    &polar::PolarCsv,
+    &polar::CArrays,
+    &ebb::Ebb::Timed,
+    &ebb::Ebb::Stepper,
+    &gcode::Paths(gcode::Flavour::Grbl),
+    &gcode::Paths(gcode::Flavour::FluidNc),
+    &gcode::Paths(gcode::Flavour::Marlin),
+    &gcode::Paths(gcode::Flavour::Klipper),
+    &gcode::Timed,
+    &klipper_steps::KlipperSteps,
+    &joint_trajectory::JointTrajectory,
+    &halstreamer::Halstreamer,
+    &pvt::Pvt,
+    &tick_lines::Raw,
+    &tick_lines::Paced,
+];
+
+/// The backend of this name.
+pub fn find(name: &str) -> Option<&'static dyn Backend> {
+    ALL.iter().copied().find(|backend| backend.name() == name)
+}

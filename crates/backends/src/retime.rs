@@ -34,67 +34,67 @@ fn interval(rows: &[Row], to: usize) -> ([i64; 2], u64) {
     ([0, 1].map(|motor| b.ticks[motor] - a.ticks[motor]), b.t_us - a.t_us)
 }
 
-fn stretched(lasts_us: u64, share: f64) -> u64 {
-    (lasts_us as f64 / share).ceil() as u64
+fn stretched(duration_us: u64, share: f64) -> u64 {
+    (duration_us as f64 / share).ceil() as u64
 }
 
-fn speeds(steps: [i64; 2], lasts_us: u64) -> Speeds {
-    steps.map(|steps| steps as f64 / (lasts_us as f64 * 1e-6))
+fn speeds(steps: [i64; 2], duration_us: u64) -> Speeds {
+    steps.map(|steps| steps as f64 / (duration_us as f64 * 1e-6))
 }
 
 /// Rows after row `at` until the motors rest, each with its index in the plan and how long it takes to get there.
 ///
 /// It ends at rest: at a row from which the motors need not move to keep to their limits.
-pub(crate) fn brake(table: &TickTable, at: usize) -> Vec<(usize, u64)> {
+pub(crate) fn decelerate(table: &TickTable, at: usize) -> Vec<(usize, u64)> {
     let (header, rows) = (&table.header, &table.rows);
     let mut way = Vec::new();
     if at == 0 || at + 1 >= rows.len() {
         return way;
     }
-    let (steps, lasts_us) = interval(rows, at);
-    let mut before = speeds(steps, lasts_us);
+    let (steps, duration_us) = interval(rows, at);
+    let mut before = speeds(steps, duration_us);
     let mut share = 1.0;
     for to in at + 1..rows.len() {
         let still = |seconds: f64| allowed(header, before, [0, 0], seconds);
-        if still(lasts_us as f64 * 1e-6) || rows[to - 1].pen != rows[to - 2].pen {
+        if still(duration_us as f64 * 1e-6) || rows[to - 1].pen != rows[to - 2].pen {
             // A pen event is a rest already.
             break;
         }
-        let (steps, lasts_us) = interval(rows, to);
+        let (steps, duration_us) = interval(rows, to);
         let candidates = (1..=SHARES).map(|k| f64::from(k) / f64::from(SHARES)).filter(|u| *u <= share);
         let slowest = candidates
             .into_iter()
-            .find(|u| allowed(header, before, steps, stretched(lasts_us, *u) as f64 * 1e-6));
+            .find(|u| allowed(header, before, steps, stretched(duration_us, *u) as f64 * 1e-6));
         share = slowest.unwrap_or(share);
-        let lasts_us = stretched(lasts_us, share);
-        before = speeds(steps, lasts_us);
-        way.push((to, lasts_us));
+        let duration_us = stretched(duration_us, share);
+        before = speeds(steps, duration_us);
+        way.push((to, duration_us));
     }
     way
 }
 
 /// Rows after row `at` to the plan's end, setting out from rest, each with its index and how long it takes to get there.
-pub(crate) fn launch(table: &TickTable, at: usize) -> Vec<(usize, u64)> {
+pub(crate) fn accelerate(table: &TickTable, at: usize) -> Vec<(usize, u64)> {
     let (header, rows) = (&table.header, &table.rows);
     let mut before = [0.0; 2];
     let mut share = SLOWEST;
     let mut way = Vec::new();
     for to in at + 1..rows.len() {
-        let (steps, lasts_us) = interval(rows, to);
+        let (steps, duration_us) = interval(rows, to);
         if share < 1.0 {
             let candidates = (1..=SHARES).rev().map(|k| f64::from(k) / f64::from(SHARES));
             let fastest = candidates
                 .into_iter()
-                .find(|u| allowed(header, before, steps, stretched(lasts_us, *u) as f64 * 1e-6));
+                .find(|u| allowed(header, before, steps, stretched(duration_us, *u) as f64 * 1e-6));
             share = fastest.unwrap_or(share);
             // A rest in the plan is a rest here: from there on it goes as planned.
             if rows[to - 1].ticks == rows[to].ticks && rows[to - 1].pen != rows[to.saturating_sub(2)].pen {
                 share = 1.0;
             }
         }
-        let lasts_us = stretched(lasts_us, share);
-        before = speeds(steps, lasts_us);
-        way.push((to, lasts_us));
+        let duration_us = stretched(duration_us, share);
+        before = speeds(steps, duration_us);
+        way.push((to, duration_us));
     }
     way
 }
@@ -123,7 +123,7 @@ pub(crate) fn travel(header: &Header, from: [i64; 2], to: [i64; 2]) -> Vec<[i64;
 }
 
 /// How long the pen takes to move in this plan, microseconds: the longest rest that begins where it goes up (or down).
-pub(crate) fn pen_time(table: &TickTable, down: bool) -> u64 {
+pub(crate) fn pen_time_us(table: &TickTable, down: bool) -> u64 {
     let rows = &table.rows;
     let changes = rows.windows(3).filter(|three| (three[1].pen != 0) == down && three[0].pen != three[1].pen);
     let rests = changes.filter(|three| three[1].ticks == three[2].ticks);

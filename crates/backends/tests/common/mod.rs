@@ -8,11 +8,11 @@
 )]
 
 use backends::asking::Asking;
-use backends::device::{Device, Ebb, Faulty, Grbl, Ticks, XyPlotter};
+use backends::device::{Device, Ebb, FaultInjector, Grbl, Ticks, XyPlotter};
 use backends::numbered::Numbered;
 use backends::repeating::Repeating;
-use backends::{Conversation, Ink, Script, simulate};
-use backends::{Instant, ebb, gcode};
+use backends::{Ink, Script, Session, simulate};
+use backends::{Setpoint, ebb, gcode};
 use drawing::Point;
 use plan::{Header, Limits, Motor, Row, TickTable};
 
@@ -84,11 +84,11 @@ pub fn drawing() -> TickTable {
 }
 
 /// Motors straight on x and y, 50 ticks a mm, the plan in the middle of seed 2's range.
-fn instants(table: &TickTable) -> impl Iterator<Item = Instant> + '_ {
+fn setpoints(table: &TickTable) -> impl Iterator<Item = Setpoint> + '_ {
     table.rows.iter().map(|row| {
         let exact = row.ticks.map(|ticks| ticks as f64);
         let at = Point::new(60.0 + exact[0] / 50.0, 60.0 + exact[1] / 50.0);
-        Instant { row: *row, exact, joints: [at.x, at.y], at }
+        Setpoint { row: *row, exact, joints: [at.x, at.y], at }
     })
 }
 
@@ -116,13 +116,13 @@ impl Protocol {
     pub fn script(self, table: &TickTable) -> Script {
         match self {
             Self::Ticks => Script::ticks(table.clone()),
-            Self::XySerial => Script::xy_serial(instants(table)).unwrap(),
-            Self::Gcode => Script::gcode(gcode::timed(instants(table), &options(), false)),
+            Self::XySerial => Script::xy_serial(setpoints(table)).unwrap(),
+            Self::Gcode => Script::gcode(gcode::timed(setpoints(table), &options(), false)),
             Self::Ebb => Script::ebb(table.clone(), ebb::Moves::Timed, ebb::Pen::Toggle).unwrap(),
         }
     }
 
-    pub fn converse(self, script: Script) -> Box<dyn Conversation> {
+    pub fn session(self, script: Script) -> Box<dyn Session> {
         match self {
             Self::Ticks => Box::new(Numbered::new(script, 8)),
             Self::XySerial => Box::new(Repeating::new(script)),
@@ -142,9 +142,9 @@ impl Protocol {
 
     /// The ink that is wanted, in the machine's own units, from the plan's rows alone.
     pub fn wanted(self, table: &TickTable) -> Vec<(u16, Vec<[f64; 2]>)> {
-        let of = |place: &dyn Fn(&Instant) -> [f64; 2], one_pen: bool| {
+        let of = |place: &dyn Fn(&Setpoint) -> [f64; 2], one_pen: bool| {
             let mut ink = Ink::default();
-            let all: Vec<Instant> = instants(table).collect();
+            let all: Vec<Setpoint> = setpoints(table).collect();
             for pair in all.windows(2) {
                 let pen = if one_pen { pair[0].row.pen.min(1) } else { pair[0].row.pen };
                 ink.pen(pen, place(&pair[0]));
@@ -174,9 +174,9 @@ impl Random {
 /// How many answers a machine gives to the whole plan, and how long that takes.
 pub fn measure(protocol: Protocol, table: &TickTable) -> (u64, u64) {
     let lines = protocol.script(table).steps.len() as u64;
-    let mut machine = Faulty::new(protocol.device(), Vec::new());
-    let mut conversation = protocol.converse(protocol.script(table));
-    let ended = simulate::run(&mut *conversation, &mut machine, 0, None, 3_600_000_000);
+    let mut machine = FaultInjector::new(protocol.device(), Vec::new());
+    let mut session = protocol.session(protocol.script(table));
+    let ended = simulate::run(&mut *session, &mut machine, 0, None, 3_600_000_000);
     (lines, ended.at_us)
 }
 

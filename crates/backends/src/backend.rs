@@ -1,0 +1,288 @@
+//! What every backend offers: the trait, and what is passed in and out.
+
+use std::fmt;
+use std::io::Write;
+
+use drawing::Drawing;
+use kinematics::Machine;
+use plan::{Header, Row, TickTable};
+
+use crate::device::Device;
+use crate::program::{Program, ProgramError};
+use crate::session::Session;
+use crate::status::StatusProtocol;
+use crate::{Setpoint, Unrepresentable, WriteError};
+
+/// A firmware or program that plans are encoded for, and in most cases sent to.
+///
+/// `Debug` prints the name.
+pub trait Backend: fmt::Debug + Send + Sync {
+    /// Its name: that of the format where it has one, otherwise that of the protocol.
+    fn name(&self) -> &'static str;
+
+    /// One line of help, if `convert --format` writes it.
+    fn format_help(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Name and one line of help, if `send --protocol` has it.
+    fn protocol(&self) -> Option<(&'static str, &'static str)> {
+        None
+    }
+
+    /// One line of help, if it can be emulated; the name is the protocol's.
+    fn emulator_help(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Whether it is for machines of this kind.
+    ///
+    /// # Errors
+    /// What kind it is for.
+    fn check(&self, _machine: &Machine) -> Result<(), Unrepresentable> {
+        Ok(())
+    }
+
+    /// What becomes of the pens' numbers.
+    fn pens(&self) -> PenNumbers;
+
+    /// Other information that is lost, or a setting that does not suit the firmware.
+    fn caveat(&self, _header: &Header) -> Option<String> {
+        None
+    }
+
+    /// What the format cannot carry of a plan with these pens.
+    fn losses(&self, header: &Header, pens: &[u16]) -> Vec<Loss> {
+        let pens = match self.pens() {
+            numbers if pens.len() > 1 && numbers != PenNumbers::Sent => {
+                Some(Loss::Pens { pens: pens.to_vec(), numbers })
+            }
+            _ => None,
+        };
+        pens.into_iter().chain(self.caveat(header).map(Loss::Caveat)).collect()
+    }
+
+    /// Whether [`Self::program`] needs the machine's kinematics.
+    fn needs_machine(&self) -> bool {
+        false
+    }
+
+    /// The program that is sent for a plan.
+    ///
+    /// # Errors
+    /// A plan that the firmware cannot execute; a backend that has no session.
+    fn program(&self, _plan: &PlanSource<'_>, _options: &EncodeOptions) -> Result<Program, ProgramError> {
+        Err(Unrepresentable::NotSent { format: self.name() }.into())
+    }
+
+    /// A program from a file in the machine's own language; `None` if plans alone are sent.
+    fn parse_program(&self, _text: &str) -> Option<Program> {
+        None
+    }
+
+    /// Writes a plan as a file.
+    ///
+    /// # Errors
+    /// A plan that the format cannot represent, before anything is written; an error of the writer.
+    fn write(
+        &self,
+        _plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        _out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        Err(Unrepresentable::NotWritten { format: self.name() }.into())
+    }
+
+    /// A session that sends a program, if the backend has a protocol.
+    fn session(&self, _program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {
+        None
+    }
+
+    /// Position reports, if the machine can be asked where it is.
+    fn status(&self) -> Option<Box<dyn StatusProtocol>> {
+        None
+    }
+
+    /// An emulated machine.
+    fn emulator(&self, _options: &EmulatorOptions) -> Option<Box<dyn Device>> {
+        None
+    }
+
+    /// The frame of the ink that the emulated machine draws.
+    fn ink_frame(&self) -> InkFrame {
+        InkFrame::Ticks
+    }
+}
+
+/// What becomes of the pens' numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PenNumbers {
+    /// The machine receives them.
+    Sent,
+    /// The machine pauses for a pen change.
+    Pause,
+    /// All strokes are drawn with the same pen.
+    Dropped,
+}
+
+/// Something that a format cannot carry.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// The pens' numbers.
+    Pens {
+        /// The plan's pens.
+        pens: Vec<u16>,
+        /// What becomes of them.
+        numbers: PenNumbers,
+    },
+    /// Anything else, as a sentence.
+    Caveat(String),
+}
+
+impl fmt::Display for Loss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pens { pens, numbers } => {
+                let pens: Vec<String> = pens.iter().map(u16::to_string).collect();
+                let what = match numbers {
+                    PenNumbers::Pause => "the machine pauses (M0) for each pen change",
+                    PenNumbers::Sent => "the machine receives their numbers",
+                    PenNumbers::Dropped => {
+                        "this firmware has no pen numbers, all strokes are drawn with the same pen"
+                    }
+                };
+                write!(f, "pens {}: {what}", pens.join(", "))
+            }
+            Self::Caveat(what) => f.write_str(what),
+        }
+    }
+}
+
+/// An iterator over rows with their exact motor positions, ticks.
+pub type RowIter<'a> = Box<dyn Iterator<Item = (Row, [f64; 2])> + 'a>;
+
+/// A plan as backends see it.
+#[derive(Clone, Copy)]
+pub struct PlanSource<'a> {
+    header: &'a Header,
+    machine: Option<&'a Machine>,
+    rows: &'a (dyn Fn() -> RowIter<'a> + 'a),
+    drawing: Option<&'a Drawing>,
+}
+
+impl fmt::Debug for PlanSource<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PlanSource").field("header", self.header).finish_non_exhaustive()
+    }
+}
+
+impl<'a> PlanSource<'a> {
+    /// Rows without a machine: enough for encoders of motor positions.
+    pub fn new(header: &'a Header, rows: &'a (dyn Fn() -> RowIter<'a> + 'a)) -> Self {
+        Self { header, machine: None, rows, drawing: None }
+    }
+
+    /// With the machine, for encoders of joints or pen positions.
+    pub fn on_machine(self, machine: &'a Machine) -> Self {
+        Self { machine: Some(machine), ..self }
+    }
+
+    /// With the drawing in machine mm, strokes in drawing order, for encoders of paths.
+    pub fn of_drawing(self, drawing: &'a Drawing) -> Self {
+        Self { drawing: Some(drawing), ..self }
+    }
+
+    /// The plan's header.
+    pub fn header(&self) -> &'a Header {
+        self.header
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> impl Iterator<Item = Row> + use<'a> {
+        (self.rows)().map(|(row, _)| row)
+    }
+
+    /// The rows as a table.
+    pub fn table(&self) -> TickTable {
+        TickTable { header: self.header.clone(), rows: self.rows().collect() }
+    }
+
+    /// The machine.
+    ///
+    /// # Errors
+    /// When none is known.
+    pub fn machine(&self, format: &'static str) -> Result<&'a Machine, Unrepresentable> {
+        self.machine.ok_or(Unrepresentable::NoMachine { format })
+    }
+
+    /// The drawing.
+    ///
+    /// # Errors
+    /// When the plan was read from a file.
+    pub fn drawing(&self, format: &'static str) -> Result<&'a Drawing, Unrepresentable> {
+        self.drawing.ok_or(Unrepresentable::NoDrawing { format })
+    }
+
+    /// The rows with joints and pen positions.
+    ///
+    /// # Errors
+    /// When no machine is known.
+    pub fn setpoints(
+        &self,
+        format: &'static str,
+    ) -> Result<impl Iterator<Item = Setpoint> + use<'a>, Unrepresentable> {
+        let machine = self.machine(format)?;
+        Ok((self.rows)().map(move |(row, exact)| Setpoint::new(machine, row, exact)))
+    }
+}
+
+/// What moves the pen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PenActuator {
+    /// A servo.
+    Servo,
+    /// The Z axis.
+    Z,
+}
+
+/// How a program is encoded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EncodeOptions {
+    /// What moves the pen; the firmware's own default if `None`.
+    pub pen_actuator: Option<PenActuator>,
+    /// Positions with the pen up and down, in the unit of the firmware; its own default if `None`.
+    pub pen_positions: Option<(i16, i16)>,
+    /// Moves that every version of the firmware executes.
+    pub legacy_moves: bool,
+}
+
+/// How a program is sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SessionOptions {
+    /// Lines or bytes in transit at once; the firmware's own default if `None`.
+    pub window: Option<usize>,
+    /// How long before its time a line is sent, where the sender keeps the plan's time, microseconds.
+    pub lead_us: u64,
+}
+
+/// How an emulated machine begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EmulatorOptions {
+    /// Where its motors are, ticks; `None` if it does not know.
+    pub start: Option<[i64; 2]>,
+    /// Whether it was homed before.
+    pub homed: bool,
+    /// A machine that acknowledges before it arrives does so within this distance, mm; 0 for an ideal one.
+    pub answers_within_mm: f64,
+}
+
+/// The frame of an emulated machine's ink.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InkFrame {
+    /// Absolute motor positions, ticks.
+    Ticks,
+    /// Motor positions since the machine was switched on, ticks.
+    TicksFromStart,
+    /// Pen positions in machine mm with this many decimals.
+    Millimetres(u8),
+}

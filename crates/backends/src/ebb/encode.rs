@@ -1,0 +1,243 @@
+//! Lines for an EiBotBoard (EBB): `LT` moves of firmware 2.7 and later, or `SM` moves of older ones.
+//!
+//! Every 40 us the board adds a rate to each axis' accumulator and steps when that reaches 2^31; `LT,T,R1,A1,R2,A2` does so
+//! `T` times (ebb command reference, "LT"). Motors move evenly between a plan's rows, so accelerations are 0 and the rates are
+//!
+//! ```text
+//! R = round((2^31 d + H - C) / T)
+//! ```
+//!
+//! for `d` steps in `T` intervals, `C` being what the accumulator holds and `H = 2^30` what it is to hold afterwards: steps
+//! fall where a motor passes the middle between two positions. The accumulators are followed exactly, so that no
+//! step is lost or gained, however long the plan; what rounding leaves over goes into the next move. Times are
+//! rounded to whole intervals since the start, not one by one.
+
+use std::io::Write;
+
+use plan::Row;
+
+use crate::Line;
+use crate::{Unrepresentable, WriteError};
+use plan::file::text::Text;
+
+/// The format's name.
+pub(super) const NAME: &str = "ebb";
+/// One interval of the board's clock, microseconds.
+const INTERVAL_US: u64 = 40;
+/// A full accumulator: one step.
+const FULL: i64 = 1 << 31;
+/// What accumulators hold after each move, or nearly.
+const HALF: i64 = 1 << 30;
+/// Most steps a second, one an interval.
+const MOST: u64 = 25_000;
+
+/// Which commands the board's firmware knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Moves {
+    /// `LT`: firmware 2.7 and later.
+    Timed,
+    /// `SM`: every firmware; times in whole milliseconds.
+    Stepper,
+}
+
+/// How the pen is moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pen {
+    /// `SP`, with the positions that the board has been told.
+    Toggle,
+    /// `S2`, a servo output with positions of its own, in units of 1/12 us.
+    Servo {
+        /// Position with the pen up.
+        up: u16,
+        /// Position with the pen down.
+        down: u16,
+        /// The output's pin, RPn.
+        pin: u8,
+    },
+}
+
+impl Pen {
+    /// The line that moves the pen and waits.
+    pub(super) fn line(self, down: bool, ms: u64) -> String {
+        match self {
+            Self::Toggle => format!("SP,{},{ms}", u8::from(!down)),
+            Self::Servo { up, down: low, pin } => {
+                format!("S2,{},{pin},0,{ms}", if down { low } else { up })
+            }
+        }
+    }
+}
+
+/// Makes lines of rows, one after the other.
+#[derive(Clone, Debug)]
+pub(super) struct Encoder {
+    moves: Moves,
+    pen: Pen,
+    /// What each accumulator holds; before the first move it is told to hold nothing.
+    accumulators: [i64; 2],
+    cleared: bool,
+    /// Intervals (or milliseconds) since the start that have been said.
+    said: u64,
+    clock_us: u64,
+}
+
+impl Encoder {
+    /// At the start of a plan.
+    pub(super) fn new(moves: Moves, pen: Pen) -> Self {
+        Self { moves, pen, accumulators: [0; 2], cleared: false, said: 0, clock_us: 0 }
+    }
+
+    /// The lines before the first move: motors on with sixteenth steps, pen up.
+    pub(super) fn start(&self) -> Vec<String> {
+        vec!["EM,1,1".to_owned(), self.pen.line(false, 500)]
+    }
+
+    /// Moves the pen, and waits.
+    pub(super) fn pen(&mut self, down: bool, wait_us: u64) -> String {
+        self.clock_us += wait_us;
+        let unit = self.unit();
+        let ms = (self.clock_us / unit).saturating_sub(self.said) * unit / 1000;
+        self.said += ms * 1000 / unit;
+        self.pen.line(down, ms)
+    }
+
+    fn unit(&self) -> u64 {
+        match self.moves {
+            Moves::Timed => INTERVAL_US,
+            Moves::Stepper => 1000,
+        }
+    }
+
+    /// Moves by so many steps in so many microseconds; nothing where the time is too short to be said yet and nothing
+    /// moves. `row` is the row at the end, for error messages.
+    ///
+    /// # Errors
+    /// When the board cannot step so fast, or the time is too short for it.
+    pub(super) fn go(
+        &mut self,
+        row: u64,
+        steps: [i64; 2],
+        duration_us: u64,
+    ) -> Result<Option<String>, Unrepresentable> {
+        let unit = self.unit();
+        self.clock_us += duration_us;
+        let time = ((self.clock_us + unit / 2) / unit).saturating_sub(self.said);
+        if time == 0 {
+            if steps == [0, 0] {
+                return Ok(None);
+            }
+            return Err(Unrepresentable::TooShort { row, us: duration_us, format: NAME, least: unit });
+        }
+        let most = steps[0].unsigned_abs().max(steps[1].unsigned_abs());
+        // Rates stay below 2^31, with room for what rounding left over.
+        if u128::from(most) * 1_000_000 >= u128::from(MOST) * u128::from(time * unit) {
+            return Err(Unrepresentable::TooFast {
+                row,
+                steps: most,
+                us: time * unit,
+                format: NAME,
+                most: MOST,
+            });
+        }
+        if self.moves == Moves::Stepper {
+            self.said += time;
+            return Ok(Some(format!("SM,{time},{},{}", steps[0], steps[1])));
+        }
+        if steps == [0, 0] {
+            // No rate at all is no move; `SM` without steps is the board's way to wait, in whole milliseconds.
+            let ms = time * unit / 1000;
+            self.said += ms * 1000 / unit;
+            return Ok((ms > 0).then(|| format!("SM,{ms},0,0")));
+        }
+        self.said += time;
+        let rates = [0, 1].map(|axis| self.rate(axis, steps[axis], time));
+        let clear = if self.cleared { "" } else { ",3" };
+        self.cleared = true;
+        Ok(Some(format!("LT,{time},{},0,{},0{clear}", rates[0], rates[1])))
+    }
+
+    /// The rate that makes exactly so many steps, and what the accumulator holds after them.
+    fn rate(&mut self, axis: usize, steps: i64, intervals: u64) -> i64 {
+        if steps == 0 {
+            return 0;
+        }
+        let (count, intervals) = (steps.abs(), intervals as i64);
+        let before = self.accumulators[axis];
+        let wanted = count * FULL + HALF - before;
+        let rate = ((2 * wanted + intervals) / (2 * intervals)).min(FULL - 1);
+        self.accumulators[axis] = before + rate * intervals - count * FULL;
+        rate * steps.signum()
+    }
+}
+
+/// The lines of a plan, in order.
+///
+/// # Errors
+/// As [`Encoder::go`].
+pub(super) fn lines(
+    rows: impl IntoIterator<Item = Row>,
+    moves: Moves,
+    pen: Pen,
+) -> Result<Vec<Line>, Unrepresentable> {
+    let mut encoder = Encoder::new(moves, pen);
+    let mut lines: Vec<Line> = encoder
+        .start()
+        .into_iter()
+        .map(|text| Line { text, row: 0, duration_us: 0, position: None })
+        .collect();
+    let mut before: Option<Row> = None;
+    let mut down = false;
+    for (index, row) in (0..).zip(rows) {
+        if let Some(last) = before {
+            let duration_us = row.t_us - last.t_us;
+            let steps = [0, 1].map(|motor| row.ticks[motor] - last.ticks[motor]);
+            let pen_moves = (last.pen != 0) != down;
+            if pen_moves {
+                down = last.pen != 0;
+                // Where the motors rest for the pen, the pen's own line waits.
+                let waits = if steps == [0, 0] { duration_us } else { 0 };
+                lines.push(Line {
+                    text: encoder.pen(down, waits),
+                    row: index - 1,
+                    duration_us: waits,
+                    position: None,
+                });
+            }
+            if !(pen_moves && steps == [0, 0])
+                && let Some(text) = encoder.go(index, steps, duration_us)?
+            {
+                lines.push(Line { text, row: index, duration_us, position: None });
+            } else if let Some(line) = lines.last_mut() {
+                line.row = index;
+            }
+        }
+        before = Some(row);
+    }
+    if down {
+        lines.push(Line {
+            text: encoder.pen(false, 0),
+            row: lines.last().map_or(0, |c| c.row),
+            duration_us: 0,
+            position: None,
+        });
+    }
+    Ok(lines)
+}
+
+/// Writes a plan. Lines end with a carriage return, as the board wants them.
+///
+/// # Errors
+/// As [`lines`], before anything is written; whatever the writer says.
+pub(super) fn write<W: Write + ?Sized>(
+    rows: impl IntoIterator<Item = Row>,
+    moves: Moves,
+    pen: Pen,
+    out: &mut W,
+) -> Result<(), WriteError> {
+    let lines = lines(rows, moves, pen)?;
+    let mut text = Text::new(out);
+    for line in lines {
+        text.str(&line.text).byte(b'\r').flush_if_full()?;
+    }
+    Ok(text.finish()?)
+}

@@ -1,0 +1,151 @@
+//! The EiBotBoard (EBB): `LT` and `SM` moves, its serial protocol, an emulated board.
+
+mod emulator;
+mod encode;
+mod status;
+
+use std::io::Write;
+use std::sync::Arc;
+
+use plan::{Header, TickTable};
+
+use crate::backend::{
+    Backend, EmulatorOptions, EncodeOptions, InkFrame, PenNumbers, PlanSource, SessionOptions,
+};
+use crate::device::Device;
+use crate::program::{Program, ProgramError, RowEncoder};
+use crate::session::Session;
+use crate::status::StatusProtocol;
+use crate::transmission::character_counting::CharacterCounting;
+use crate::{Line, Unrepresentable, WriteError};
+
+/// How long the board lifts the pen when a session fails or stops, milliseconds.
+const LIFT_MS: u64 = 500;
+/// The board executes a command every 4 ms at best.
+const SHORTEST_PERIOD_US: u64 = 4000;
+
+/// By the commands that the board's firmware knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ebb {
+    /// `LT`: firmware 2.7 and later.
+    Timed,
+    /// `SM`: every firmware; times in whole milliseconds.
+    Stepper,
+}
+
+impl Ebb {
+    fn encoder(self, options: &EncodeOptions) -> EbbEncoder {
+        let moves = if self == Self::Stepper || options.legacy_moves {
+            encode::Moves::Stepper
+        } else {
+            encode::Moves::Timed
+        };
+        let pen = if options.pen_actuator.is_none() && options.pen_positions.is_none() {
+            encode::Pen::Toggle
+        } else {
+            // The output of the board's own pen servo, and positions well inside what servos take.
+            let (up, down) = options.pen_positions.unwrap_or((16_000, 12_000));
+            encode::Pen::Servo { up: up.max(0) as u16, down: down.max(0) as u16, pin: 4 }
+        };
+        EbbEncoder { moves, pen }
+    }
+}
+
+impl Backend for Ebb {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Timed => "ebb",
+            Self::Stepper => "ebb-sm",
+        }
+    }
+
+    fn format_help(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::Timed => "EiBotBoard, firmware 2.7 and later",
+            Self::Stepper => "EiBotBoard, older firmware",
+        })
+    }
+
+    fn protocol(&self) -> Option<(&'static str, &'static str)> {
+        (*self == Self::Timed).then_some(("ebb", "EiBotBoard"))
+    }
+
+    fn emulator_help(&self) -> Option<&'static str> {
+        (*self == Self::Timed).then_some("An EiBotBoard")
+    }
+
+    fn pens(&self) -> PenNumbers {
+        PenNumbers::Dropped
+    }
+
+    fn caveat(&self, header: &Header) -> Option<String> {
+        let period_us = header.period_us;
+        (period_us < SHORTEST_PERIOD_US).then(|| {
+            format!(
+                "the board executes a command every 4 ms at best, and rows are {period_us} us apart; plan with a longer --period"
+            )
+        })
+    }
+
+    fn program(&self, plan: &PlanSource<'_>, options: &EncodeOptions) -> Result<Program, ProgramError> {
+        Program::of_table(plan.table(), Arc::new(self.encoder(options)))
+    }
+
+    fn write(
+        &self,
+        plan: &PlanSource<'_>,
+        options: &EncodeOptions,
+        out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        let EbbEncoder { moves, pen } = self.encoder(options);
+        encode::write(plan.rows(), moves, pen, out)
+    }
+
+    fn session(&self, program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {
+        // The board's answers to queries cannot be told from those to lines: one line at a time.
+        Some(Box::new(CharacterCounting::new(program, self.status()?, 0)))
+    }
+
+    fn status(&self) -> Option<Box<dyn StatusProtocol>> {
+        Some(Box::new(status::EbbStatus::default()))
+    }
+
+    fn emulator(&self, _options: &EmulatorOptions) -> Option<Box<dyn Device>> {
+        Some(Box::new(emulator::Ebb::new()))
+    }
+
+    fn ink_frame(&self) -> InkFrame {
+        InkFrame::TicksFromStart
+    }
+}
+
+/// Rows as the board's lines. Its counters count from the plan's start.
+#[derive(Clone, Copy, Debug)]
+struct EbbEncoder {
+    moves: encode::Moves,
+    pen: encode::Pen,
+}
+
+impl RowEncoder for EbbEncoder {
+    fn lines(&self, table: &TickTable, resumed: bool) -> Result<Vec<Line>, Unrepresentable> {
+        let mut lines = encode::lines(table.rows.iter().copied(), self.moves, self.pen)?;
+        if resumed {
+            // `EM` would clear the counters.
+            lines.retain(|line| !line.text.starts_with("EM"));
+        }
+        Ok(lines)
+    }
+
+    fn lift(&self, _done: &[Line]) -> Vec<Line> {
+        let text = self.pen.line(false, LIFT_MS);
+        vec![Line { text, duration_us: LIFT_MS * 1000, ..Line::default() }]
+    }
+
+    fn reported_position(&self, ticks: [i64; 2], start: [i64; 2]) -> [i64; 2] {
+        [0, 1].map(|motor| ticks[motor] - start[motor])
+    }
+
+    fn ticks_at(&self, position: [i64; 2], start: [i64; 2]) -> [i64; 2] {
+        [0, 1].map(|motor| position[motor] + start[motor])
+    }
+}

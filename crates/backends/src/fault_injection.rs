@@ -1,0 +1,138 @@
+//! A wire on which things go wrong, at a certain answer or at a certain time.
+
+use std::collections::VecDeque;
+
+use crate::device::Device;
+
+/// What goes wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The machine's answer of this number, from 0, never comes.
+    LostAnswer(u64),
+    /// That answer, and whatever comes after it, comes so much later, microseconds.
+    LateAnswer(u64, u64),
+    /// That answer comes with other characters in it.
+    GarbledAnswer(u64),
+    /// From this time on the machine takes nothing out of its buffer for so long, microseconds.
+    FullBuffer(u64, u64),
+    /// From this time on the wire is away for so long, microseconds: what is on it is lost, in both directions. The machine
+    /// keeps its power and does what it was told.
+    Unplugged(u64, u64),
+    /// The byte of this number that the sender sends comes with a bit changed.
+    GarbledByte(u64),
+}
+
+/// A machine behind such a wire.
+pub struct FaultInjector {
+    device: Box<dyn Device>,
+    faults: Vec<Fault>,
+    answered: u64,
+    received: u64,
+    /// Answers on their way, with the time from which they may be heard.
+    wire: VecDeque<(u64, Vec<u8>)>,
+}
+
+impl std::fmt::Debug for FaultInjector {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FaultInjector").field("faults", &self.faults).finish_non_exhaustive()
+    }
+}
+
+impl FaultInjector {
+    /// With these faults to come.
+    pub fn new(device: Box<dyn Device>, faults: Vec<Fault>) -> Self {
+        Self { device, faults, answered: 0, received: 0, wire: VecDeque::new() }
+    }
+
+    /// The machine.
+    pub fn device(&self) -> &dyn Device {
+        &*self.device
+    }
+
+    /// Whether the wire is there.
+    pub fn plugged(&self, now_us: u64) -> bool {
+        !self
+            .faults
+            .iter()
+            .any(|fault| matches!(fault, Fault::Unplugged(at, lasts) if (*at..at + lasts).contains(&now_us)))
+    }
+
+    /// Time has come so far.
+    pub fn advance(&mut self, now_us: u64) {
+        for fault in &self.faults {
+            if let Fault::FullBuffer(at, lasts) = fault
+                && (*at..at + lasts).contains(&now_us)
+            {
+                self.device.stall(at + lasts);
+            }
+        }
+        self.device.advance(now_us);
+        self.collect(now_us);
+    }
+
+    fn collect(&mut self, now_us: u64) {
+        for mut answer in self.device.answers() {
+            let number = self.answered;
+            self.answered += 1;
+            let mut heard_us = now_us;
+            let mut lost = !self.plugged(now_us);
+            for fault in &self.faults {
+                match fault {
+                    Fault::LostAnswer(n) => lost |= *n == number,
+                    Fault::LateAnswer(n, late_us) if *n == number => heard_us = now_us + late_us,
+                    Fault::GarbledAnswer(n) if *n == number => {
+                        for (k, byte) in answer.iter_mut().enumerate().filter(|(_, byte)| **byte > b' ') {
+                            *byte = b'#' + ((number + 7 * k as u64) % 11) as u8;
+                        }
+                        answer.insert(0, 0xFE);
+                    }
+                    _ => {}
+                }
+            }
+            if !lost {
+                // Answers come in the order in which they were given.
+                let heard_us = self.wire.back().map_or(heard_us, |(before, _)| heard_us.max(*before));
+                self.wire.push_back((heard_us, answer));
+            }
+        }
+        if !self.plugged(now_us) {
+            self.wire.clear();
+        }
+    }
+
+    /// Bytes from the sender.
+    pub fn receive(&mut self, bytes: &[u8], now_us: u64) {
+        self.advance(now_us);
+        let mut bytes = bytes.to_vec();
+        for byte in &mut bytes {
+            if self.faults.contains(&Fault::GarbledByte(self.received)) {
+                *byte ^= 0x04;
+            }
+            self.received += 1;
+        }
+        if self.plugged(now_us) {
+            self.device.receive(&bytes, now_us);
+        }
+        self.collect(now_us);
+    }
+
+    /// What the sender hears now.
+    pub fn heard(&mut self, now_us: u64) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        while self.wire.front().is_some_and(|(heard_us, _)| *heard_us <= now_us) {
+            bytes.extend(self.wire.pop_front().map(|(_, answer)| answer).unwrap_or_default());
+        }
+        bytes
+    }
+
+    /// When something happens next by itself.
+    pub fn wake_us(&self, now_us: u64) -> Option<u64> {
+        let faults = self.faults.iter().flat_map(|fault| match fault {
+            Fault::FullBuffer(at, lasts) | Fault::Unplugged(at, lasts) => vec![*at, at + lasts],
+            _ => Vec::new(),
+        });
+        let heard = self.wire.front().map(|(heard_us, _)| *heard_us);
+        let device = self.device.wake_us();
+        faults.filter(|at| *at > now_us).chain(heard).chain(device).min()
+    }
+}

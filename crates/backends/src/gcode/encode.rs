@@ -1,0 +1,346 @@
+//! G-code for firmwares that do the kinematics themselves: the drawing as Cartesian paths in machine mm.
+//!
+//! Two ways: [`commands`] says the drawing (lines, arcs as `G2` and `G3`, the speed of each stroke as the plan has it on
+//! average) and leaves acceleration to the firmware's own planner; [`timed`] says each row of the plan with the time it
+//! takes (`G93`, inverse time). A firmware plans again in either case: times are wishes.
+//!
+//! Before every stroke stands a comment `; s N`: a sender may go on there, at the command with that number.
+
+use std::f64::consts::PI;
+use std::io::Write;
+
+use drawing::{Drawing, EllipticArc, Point, Segment};
+
+use crate::WriteError;
+use crate::{Line, Setpoint};
+use plan::Row;
+use plan::file::text::Text;
+
+/// Whose G-code it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Flavour {
+    /// grbl 1.1 and grblHAL.
+    Grbl,
+    /// FluidNC.
+    FluidNc,
+    /// Marlin 2, with `ARC_SUPPORT`.
+    Marlin,
+    /// Klipper, with `[gcode_arcs]` and, for a servo, `[servo pen]`.
+    Klipper,
+}
+
+/// What moves the pen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pen {
+    /// A servo: spindle speed for grbl and FluidNC, degrees for the others.
+    Servo {
+        /// Position with the pen up.
+        up: u16,
+        /// Position with the pen down.
+        down: u16,
+    },
+    /// The Z axis, mm.
+    Z {
+        /// Height with the pen up.
+        up: i16,
+        /// Height with the pen down.
+        down: i16,
+    },
+}
+
+/// How to say things.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Options {
+    /// Whose G-code it is.
+    pub(super) flavour: Flavour,
+    /// What moves the pen.
+    pub(super) pen: Pen,
+    /// How long the pen takes to go up and to come down, s.
+    pub(super) pen_s: [f64; 2],
+    /// Speed of travel with the pen up, mm/s.
+    pub(super) travel_mm_s: f64,
+    /// Chords of what is neither a line nor an arc of a circle stay so close to it, mm.
+    pub(super) chord_mm: f64,
+}
+
+/// An arc is cut so that no part turns further than this: firmwares are at a loss with whole circles, and lose digits.
+const MOST_TURN: f64 = PI / 2.0;
+/// Arcs beyond this radius, mm, are chords: `I` and `J` would lose too many digits.
+const LARGEST_RADIUS_MM: f64 = 10_000.0;
+
+struct Program<'a> {
+    options: &'a Options,
+    lines: Vec<Line>,
+    here: Option<Point>,
+    /// The last feed that was said; firmwares remember it.
+    feed: f64,
+}
+
+impl Program<'_> {
+    fn push(&mut self, text: String, duration_s: f64) {
+        let row = self.lines.len() as u64 + 1;
+        self.lines.push(Line { text, row, duration_us: (duration_s * 1e6).round() as u64, position: None });
+    }
+
+    fn start(&mut self) {
+        // Millimetres, absolute; arcs in the plane of the paper.
+        for text in ["G21", "G90", "G17"] {
+            self.push(text.to_owned(), 0.0);
+        }
+        if self.options.flavour != Flavour::Klipper {
+            self.push("G94".to_owned(), 0.0);
+        }
+        self.pen(false);
+    }
+
+    fn pen(&mut self, down: bool) {
+        let Options { flavour, pen, pen_s, .. } = *self.options;
+        let wait_s = pen_s[usize::from(down)];
+        match pen {
+            Pen::Z { up, down: low } => {
+                let text = if down { format!("G1 Z{low} F1000") } else { format!("G0 Z{up}") };
+                self.feed = f64::NAN;
+                self.push(text, wait_s);
+            }
+            Pen::Servo { up, down: low } => {
+                let angle = if down { low } else { up };
+                match flavour {
+                    Flavour::Grbl | Flavour::FluidNc => self.push(format!("M3 S{angle}"), 0.0),
+                    Flavour::Marlin => {
+                        // A servo does not wait for the motion before it.
+                        self.push("M400".to_owned(), 0.0);
+                        self.push(format!("M280 P0 S{angle}"), 0.0);
+                    }
+                    Flavour::Klipper => {
+                        self.push("M400".to_owned(), 0.0);
+                        self.push(format!("SET_SERVO SERVO=pen ANGLE={angle}"), 0.0);
+                    }
+                }
+                let dwell = match flavour {
+                    Flavour::Grbl | Flavour::FluidNc => format!("G4 P{}", decimal(wait_s, 3)),
+                    Flavour::Marlin | Flavour::Klipper => format!("G4 P{}", decimal(wait_s * 1000.0, 0)),
+                };
+                self.push(dwell, wait_s);
+            }
+        }
+    }
+
+    fn change_pen(&mut self, pen: u16) {
+        let text = if self.options.flavour == Flavour::Klipper { "PAUSE" } else { "M0" };
+        self.push(format!("{text} ; put in pen {pen}"), 0.0);
+    }
+
+    fn travel(&mut self, to: Point) {
+        let far = self.here.map_or(0.0, |from| from.distance(to));
+        self.push(format!("G0 {}", xy(to)), far / self.options.travel_mm_s);
+        self.here = Some(to);
+    }
+
+    fn line(&mut self, to: Point, mm_s: f64) {
+        let far = self.here.map_or(0.0, |from| from.distance(to));
+        let feed = self.feed(mm_s);
+        self.push(format!("G1 {}{feed}", xy(to)), far / mm_s);
+        self.here = Some(to);
+    }
+
+    /// An arc of a circle from where it is to `to`.
+    fn arc(&mut self, arc: &EllipticArc, to: Point, clockwise: bool, length: f64, mm_s: f64) {
+        let Some(from) = self.here else { return };
+        let center = arc.center - from;
+        let feed = self.feed(mm_s);
+        let verb = if clockwise { "G2" } else { "G3" };
+        let text = format!("{verb} {} I{} J{}{feed}", xy(to), decimal(center.x, 4), decimal(center.y, 4));
+        self.push(text, length / mm_s);
+        self.here = Some(to);
+    }
+
+    /// The feed in mm a minute where it is not the one said before.
+    fn feed(&mut self, mm_s: f64) -> String {
+        let feed = (mm_s * 60.0 * 10.0).round() / 10.0;
+        if feed == self.feed {
+            return String::new();
+        }
+        self.feed = feed;
+        format!(" F{}", decimal(feed, 1))
+    }
+
+    fn segment(&mut self, segment: &Segment, mm_s: f64) {
+        if let Segment::Arc(arc) = segment
+            && let Some(radius) = arc.circle_radius().filter(|radius| *radius < LARGEST_RADIUS_MM)
+        {
+            let parts = (arc.sweep_rad.abs() / MOST_TURN).ceil().max(1.0);
+            // Mirrored, the half-diameters turn the other way.
+            let clockwise = arc.a.cross(arc.b) * arc.sweep_rad < 0.0;
+            for part in 1..=parts as u64 {
+                let to = arc.eval(part as f64 / parts);
+                if same(self.here, to) {
+                    continue;
+                }
+                self.arc(arc, to, clockwise, radius * arc.sweep_rad.abs() / parts, mm_s);
+            }
+            return;
+        }
+        let mut points = Vec::new();
+        segment.flatten(self.options.chord_mm, |point| points.push(point));
+        for point in points {
+            if !same(self.here, point) {
+                self.line(point, mm_s);
+            }
+        }
+    }
+}
+
+/// Whether two places are the same in the digits that are written.
+fn same(here: Option<Point>, to: Point) -> bool {
+    here.is_some_and(|here| xy(here) == xy(to))
+}
+
+fn xy(p: Point) -> String {
+    format!("X{} Y{}", decimal(p.x, 3), decimal(p.y, 3))
+}
+
+/// With so many decimals at the most, no zeros at the end, and no negative 0.
+fn decimal(number: f64, decimals: usize) -> String {
+    let text = format!("{number:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// The commands that draw `drawing` (machine mm, in its order), then travel to `park`. `speeds_mm_s` has the speed of each
+/// stroke.
+pub(super) fn paths(drawing: &Drawing, speeds_mm_s: &[f64], park: Point, options: &Options) -> Vec<Line> {
+    let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
+    program.start();
+    let mut pen = drawing.strokes.first().map(|stroke| stroke.pen);
+    for (stroke, speed) in drawing.strokes.iter().zip(speeds_mm_s) {
+        if pen != Some(stroke.pen) {
+            pen = Some(stroke.pen);
+            program.change_pen(stroke.pen.0);
+        }
+        program.travel(stroke.start());
+        program.pen(true);
+        for segment in stroke.segments() {
+            program.segment(&segment, *speed);
+        }
+        program.pen(false);
+    }
+    program.travel(park);
+    program.lines
+}
+
+/// The commands that say each row of a plan, in the time it has: with `G93`, or with a feed for each row.
+pub(super) fn timed(
+    setpoints: impl IntoIterator<Item = Setpoint>,
+    options: &Options,
+    inverse: bool,
+) -> Vec<Line> {
+    let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
+    program.start();
+    let mut before: Option<Setpoint> = None;
+    let mut down = false;
+    let mut selected = 0;
+    let mut sent_us = 0;
+    let mut last = 0;
+    for (index, setpoint) in (0_u64..).zip(setpoints) {
+        last = index;
+        let first = program.lines.len();
+        if let Some(previous) = before {
+            let pen = previous.row.pen;
+            if (pen != 0) != down {
+                if pen != 0 && selected != 0 && pen != selected {
+                    program.change_pen(pen);
+                }
+                selected = if pen == 0 { selected } else { pen };
+                down = pen != 0;
+                program.pen(down);
+                for line in &mut program.lines[first..] {
+                    line.row = index - 1;
+                }
+                let rests = previous.row.ticks == setpoint.row.ticks;
+                sent_us = if rests { setpoint.row.t_us } else { previous.row.t_us };
+            }
+            let first = program.lines.len();
+            if !same(program.here, setpoint.at) {
+                let duration_s = (setpoint.row.t_us - sent_us) as f64 * 1e-6;
+                sent_us = setpoint.row.t_us;
+                if inverse {
+                    program.push(
+                        format!("G93 G1 {} F{}", xy(setpoint.at), decimal(60.0 / duration_s, 3)),
+                        duration_s,
+                    );
+                    program.here = Some(setpoint.at);
+                } else {
+                    let from = program.here.unwrap_or(setpoint.at);
+                    program.line(setpoint.at, from.distance(setpoint.at).max(1e-3) / duration_s.max(1e-6));
+                }
+            }
+            for line in &mut program.lines[first..] {
+                line.row = index;
+            }
+        } else {
+            program.travel(setpoint.at);
+            for line in &mut program.lines {
+                line.row = 0;
+            }
+        }
+        before = Some(setpoint);
+    }
+    let done = program.lines.len();
+    if down {
+        program.pen(false);
+    }
+    if inverse {
+        program.push("G94".to_owned(), 0.0);
+    }
+    // What follows the last row leads to no other.
+    for line in &mut program.lines[done..] {
+        line.row = last;
+    }
+    program.lines
+}
+
+/// Writes commands, with `; s N` before every travel.
+///
+/// # Errors
+/// Whatever the writer says.
+pub(super) fn write<W: Write + ?Sized>(lines: &[Line], out: &mut W) -> Result<(), WriteError> {
+    let mut text = Text::new(out);
+    for (index, line) in lines.iter().enumerate() {
+        if line.text.starts_with("G0 X") {
+            text.str("; s ").int(index).byte(b'\n');
+        }
+        text.str(&line.text).byte(b'\n').flush_if_full()?;
+    }
+    Ok(text.finish()?)
+}
+
+/// The mean speed of each stroke in a plan, mm/s: its length over the time that the pen is down and moves, at most
+/// `max_mm_s`. `rows` are those of a plan of `drawing`.
+pub(super) fn stroke_speeds_mm_s(
+    drawing: &Drawing,
+    rows: impl Iterator<Item = Row>,
+    max_mm_s: f64,
+) -> Vec<f64> {
+    let mut times_us: Vec<u64> = Vec::new();
+    let mut before: Option<Row> = None;
+    let mut pen = 0;
+    for row in rows {
+        if let Some(last) = before
+            && last.pen != 0
+        {
+            if last.pen != pen {
+                times_us.push(0);
+            }
+            if let Some(time_us) = times_us.last_mut().filter(|_| last.ticks != row.ticks) {
+                *time_us += row.t_us - last.t_us;
+            }
+        }
+        pen = before.map_or(0, |last| last.pen);
+        before = Some(row);
+    }
+    let speed = |(index, stroke): (usize, &drawing::Stroke)| {
+        let seconds = times_us.get(index).map_or(0.0, |us| *us as f64 * 1e-6);
+        if seconds > 0.0 { (stroke.length() / seconds).clamp(0.1, max_mm_s) } else { max_mm_s }
+    };
+    drawing.strokes.iter().enumerate().map(speed).collect()
+}

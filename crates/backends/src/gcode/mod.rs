@@ -1,0 +1,170 @@
+//! G-code for grbl, grblHAL, FluidNC, Marlin and Klipper, which do the kinematics themselves; sessions with grbl and its
+//! kin; an emulated grbl.
+
+mod emulator;
+mod encode;
+mod program;
+mod status;
+
+use std::io::Write;
+
+use crate::backend::{
+    Backend, EmulatorOptions, EncodeOptions, InkFrame, PenActuator, PenNumbers, PlanSource, SessionOptions,
+};
+use crate::device::Device;
+use crate::program::{Program, ProgramError};
+use crate::session::Session;
+use crate::status::StatusProtocol;
+use crate::transmission::character_counting::CharacterCounting;
+use crate::{Line, WriteError};
+
+pub(crate) use encode::Flavour;
+
+/// Chords of curves that G-code cannot express deviate by no more than this, mm.
+const CHORD_MM: f64 = 0.01;
+/// grbl's receive buffer, less one byte.
+const WINDOW_BYTES: usize = 127;
+
+/// Micrometres as millimetres.
+fn millimetres(micrometres: i64) -> String {
+    let sign = if micrometres < 0 { "-" } else { "" };
+    let size = micrometres.unsigned_abs();
+    format!("{sign}{}.{:03}", size / 1000, size % 1000)
+}
+
+/// How G-code is written for the plan's machine.
+fn options(
+    flavour: Flavour,
+    format: &'static str,
+    plan: &PlanSource<'_>,
+    options: &EncodeOptions,
+) -> Result<encode::Options, crate::Unrepresentable> {
+    let lift = plan.machine(format)?.pen();
+    let pen = if options.pen_actuator == Some(PenActuator::Z) {
+        let (up, down) = options.pen_positions.unwrap_or((5, 0));
+        encode::Pen::Z { up, down }
+    } else {
+        let (up, down) = options.pen_positions.unwrap_or((40, 90));
+        encode::Pen::Servo { up: up.max(0) as u16, down: down.max(0) as u16 }
+    };
+    Ok(encode::Options {
+        flavour,
+        pen,
+        pen_s: [lift.lift_time, lift.drop_time],
+        // Without a travel speed of its own the pen travels as fast as the motors can, which is at least the drawing speed.
+        travel_mm_s: if lift.max_travel_speed.is_finite() { lift.max_travel_speed } else { lift.max_speed },
+        chord_mm: CHORD_MM,
+    })
+}
+
+/// Lines and arcs of the drawing, with the mean speed of each stroke; the firmware plans accelerations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Paths(pub(crate) Flavour);
+
+impl Backend for Paths {
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Flavour::Grbl => "gcode-grbl",
+            Flavour::FluidNc => "gcode-fluidnc",
+            Flavour::Marlin => "gcode-marlin",
+            Flavour::Klipper => "gcode-klipper",
+        }
+    }
+
+    fn format_help(&self) -> Option<&'static str> {
+        Some(match self.0 {
+            Flavour::Grbl => "G-code for grbl, with arcs",
+            Flavour::FluidNc => "G-code for FluidNC, with arcs",
+            Flavour::Marlin => "G-code for Marlin, with arcs",
+            Flavour::Klipper => "G-code for Klipper, with arcs",
+        })
+    }
+
+    fn protocol(&self) -> Option<(&'static str, &'static str)> {
+        (self.0 == Flavour::Grbl).then_some(("gcode", "G-code for grbl, grblHAL and FluidNC"))
+    }
+
+    fn emulator_help(&self) -> Option<&'static str> {
+        (self.0 == Flavour::Grbl).then_some("A grbl with its buffer of 128 bytes")
+    }
+
+    fn pens(&self) -> PenNumbers {
+        PenNumbers::Pause
+    }
+
+    fn needs_machine(&self) -> bool {
+        true
+    }
+
+    fn write(
+        &self,
+        plan: &PlanSource<'_>,
+        encode: &EncodeOptions,
+        out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        let options = options(self.0, self.name(), plan, encode)?;
+        let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
+        let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, plan.rows(), machine.pen().max_speed);
+        let park = machine.geometry().forward(&machine.start());
+        encode::write(&encode::paths(drawing, &speeds_mm_s, park, &options), out)
+    }
+
+    fn program(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Result<Program, ProgramError> {
+        let options = options(self.0, self.name(), plan, encode)?;
+        Ok(program::program(encode::timed(plan.setpoints(self.name())?, &options, false)))
+    }
+
+    fn parse_program(&self, text: &str) -> Option<Program> {
+        Some(program::parse(text))
+    }
+
+    fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
+        let window = options.window.unwrap_or(WINDOW_BYTES);
+        Some(Box::new(CharacterCounting::new(program, self.status()?, window)))
+    }
+
+    fn status(&self) -> Option<Box<dyn StatusProtocol>> {
+        Some(Box::new(status::GrblStatus::default()))
+    }
+
+    fn emulator(&self, _options: &EmulatorOptions) -> Option<Box<dyn Device>> {
+        (self.0 == Flavour::Grbl).then(|| Box::new(emulator::Grbl::new()) as Box<dyn Device>)
+    }
+
+    fn ink_frame(&self) -> InkFrame {
+        InkFrame::Millimetres(3)
+    }
+}
+
+/// Each row of the plan with its duration (`G93`).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timed;
+
+impl Backend for Timed {
+    fn name(&self) -> &'static str {
+        "gcode-timed"
+    }
+
+    fn format_help(&self) -> Option<&'static str> {
+        Some("G-code of the plan's rows with their times (G93), for grbl, FluidNC and LinuxCNC")
+    }
+
+    fn pens(&self) -> PenNumbers {
+        PenNumbers::Pause
+    }
+
+    fn needs_machine(&self) -> bool {
+        true
+    }
+
+    fn write(
+        &self,
+        plan: &PlanSource<'_>,
+        encode: &EncodeOptions,
+        out: &mut dyn Write,
+    ) -> Result<(), WriteError> {
+        let options = options(Flavour::Grbl, self.name(), plan, encode)?;
+        let lines: Vec<Line> = encode::timed(plan.setpoints(self.name())?, &options, true);
+        encode::write(&lines, out)
+    }
+}

@@ -1,0 +1,368 @@
+//! Programs: the lines for one machine, and how to stop and resume anywhere in them.
+
+use std::fmt;
+use std::sync::Arc;
+
+use plan::{Header, Row, TickTable};
+
+use crate::{Unrepresentable, retime};
+
+/// One line of a program.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Line {
+    /// What is sent, without the line end.
+    pub text: String,
+    /// Index of the plan's row reached when the line is done; for a file in the machine's own language, the line's number.
+    pub row: u64,
+    /// How long it takes, microseconds.
+    pub duration_us: u64,
+    /// Position that the machine reports after it, in the unit of its reports; `None` if the line does not move.
+    pub position: Option<[i64; 2]>,
+}
+
+/// Lines that a machine may have executed without an acknowledgement having arrived.
+const UNACKNOWLEDGED: usize = 64;
+/// How long a line takes that is added on resuming, microseconds.
+const RESUME_LINE_US: u64 = 1_000_000;
+/// How long the pen has to lift on a stop, microseconds.
+const LIFT_US: u64 = 500_000;
+
+/// Encodes rows of motor positions as lines: what a program of rows needs in order to be stopped and resumed.
+pub trait RowEncoder: fmt::Debug + Send + Sync {
+    /// The lines of a plan; [`Line::row`] is an index into `table`. A `resumed` program must not reset what the machine
+    /// knows about its motors.
+    ///
+    /// # Errors
+    /// A row that the firmware cannot execute.
+    fn lines(&self, table: &TickTable, resumed: bool) -> Result<Vec<Line>, Unrepresentable>;
+
+    /// The lines that lift the pen where the machine is, after the lines that are `done`.
+    fn lift(&self, done: &[Line]) -> Vec<Line>;
+
+    /// The position that the machine reports at `ticks`, for a plan that starts at `start` ticks.
+    fn reported_position(&self, ticks: [i64; 2], _start: [i64; 2]) -> [i64; 2] {
+        ticks
+    }
+
+    /// The inverse of [`Self::reported_position`].
+    fn ticks_at(&self, position: [i64; 2], _start: [i64; 2]) -> [i64; 2] {
+        position
+    }
+}
+
+/// The machine's own language: what a program of its lines needs in order to be stopped and resumed.
+pub trait LineLanguage: fmt::Debug + Send + Sync {
+    /// The lines that lift the pen.
+    fn lift(&self) -> Vec<String>;
+
+    /// The lines that restore the state after `done`: modes, position, pen.
+    fn resume(&self, done: &[Line]) -> Vec<Line>;
+
+    /// Largest deviation of a reported position from the commanded one, per axis.
+    fn position_tolerance(&self) -> u64 {
+        0
+    }
+}
+
+/// A table of rows, encoded.
+#[derive(Clone, Debug)]
+struct EncodedTable {
+    table: TickTable,
+    encoder: Arc<dyn RowEncoder>,
+    /// Index in the whole plan of each row of `table`.
+    origin: Vec<u64>,
+    /// Index in `table` of the row that each line of the program reaches.
+    reached: Vec<usize>,
+    /// Where the motors of the whole plan start, ticks.
+    start: [i64; 2],
+    resumed: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    Table(Box<EncodedTable>),
+    Language(Arc<dyn LineLanguage>),
+    /// Lines of unknown meaning.
+    Opaque,
+}
+
+/// What is sent to a machine.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// The lines.
+    pub lines: Vec<Line>,
+    /// The row where the machine is before the first line: 0, or where the program was resumed.
+    first_row: u64,
+    source: Source,
+}
+
+/// Why a program cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProgramError {
+    /// The plan has no such row.
+    #[error("the plan has rows 0 to {last}, not {row}")]
+    NoRow {
+        /// The row asked for.
+        row: u64,
+        /// The last row.
+        last: u64,
+    },
+    /// The plan has no rows.
+    #[error("the plan has no rows")]
+    Empty,
+    /// The format cannot represent the plan.
+    #[error(transparent)]
+    Unrepresentable(#[from] Unrepresentable),
+}
+
+/// The rows from `row` on, starting at `position` ticks with the pen up: travel, pen down if it was down, and the rest of
+/// the rows, accelerating from rest. With each row's index in `table`.
+fn resume(table: &TickTable, row: usize, position: [i64; 2]) -> (TickTable, Vec<u64>) {
+    let rows = &table.rows;
+    let index = row as u64;
+    let period_us = table.header.period_us.max(1);
+    let mut new = vec![Row { t_us: 0, pen: 0, ticks: position }];
+    let mut origin = vec![index];
+    let mut push = |new: &mut Vec<Row>, duration_us: u64, ticks: [i64; 2], pen: u16, index: u64| {
+        let t_us = new.last().map_or(0, |row| row.t_us) + duration_us;
+        new.push(Row { t_us, pen, ticks });
+        origin.push(index);
+    };
+    for ticks in retime::travel(&table.header, position, rows[row].ticks) {
+        push(&mut new, period_us, ticks, 0, index);
+    }
+    if rows[row].pen != 0 {
+        if new.len() == 1 {
+            push(&mut new, period_us, rows[row].ticks, 0, index);
+        }
+        // Where the plan itself lowers the pen, it also waits for it.
+        let waits = row > 0 && rows[row - 1].pen == 0;
+        if let Some(here) = new.last_mut() {
+            here.pen = rows[row].pen;
+        }
+        if !waits {
+            push(&mut new, retime::pen_time_us(table, true), rows[row].ticks, rows[row].pen, index);
+        }
+    }
+    for (to, duration_us) in retime::accelerate(table, row) {
+        push(&mut new, duration_us, rows[to].ticks, rows[to].pen, to as u64);
+    }
+    (with_rows(&table.header, new), origin)
+}
+
+/// The rows up to `row`, then to rest as soon as the limits allow, pen up. With each row's index in `table`.
+fn stop_after(table: &TickTable, row: usize) -> (TickTable, Vec<u64>) {
+    let mut rows: Vec<Row> = table.rows[..=row].to_vec();
+    let mut origin: Vec<u64> = (0..=row as u64).collect();
+    for (to, duration_us) in retime::decelerate(table, row) {
+        let t_us = rows.last().map_or(0, |row| row.t_us) + duration_us;
+        rows.push(Row { t_us, ..table.rows[to] });
+        origin.push(to as u64);
+    }
+    let lift_us = retime::pen_time_us(table, false);
+    let was_down = rows.len() > 1 && rows[rows.len() - 2].pen != 0;
+    let here = origin.last().copied().unwrap_or(0);
+    if let Some(last) = rows.last_mut() {
+        last.pen = 0;
+        let rest = Row { t_us: last.t_us + lift_us, ..*last };
+        if was_down {
+            rows.push(rest);
+            origin.push(here);
+        }
+    }
+    (with_rows(&table.header, rows), origin)
+}
+
+fn with_rows(header: &Header, rows: Vec<Row>) -> TickTable {
+    let duration_us = rows.last().map_or(0, |row| row.t_us);
+    TickTable { header: Header { rows: rows.len() as u64, duration_us, ..header.clone() }, rows }
+}
+
+impl EncodedTable {
+    /// Encodes it: the lines, with rows of the whole plan.
+    fn encode(mut self) -> Result<Program, ProgramError> {
+        let mut lines = self.encoder.lines(&self.table, self.resumed)?;
+        self.reached = lines.iter().map(|line| line.row as usize).collect();
+        for line in &mut lines {
+            line.row = self.origin[line.row as usize];
+        }
+        let first_row = self.origin.first().copied().unwrap_or(0);
+        Ok(Program { lines, first_row, source: Source::Table(Box::new(self)) })
+    }
+
+    fn from_row(&self, row: u64, position: Option<[i64; 2]>) -> Result<Program, ProgramError> {
+        let last = self.table.rows.len() as u64 - 1;
+        if row > last {
+            return Err(ProgramError::NoRow { row, last });
+        }
+        let position =
+            position.map_or(self.table.rows[row as usize].ticks, |at| self.encoder.ticks_at(at, self.start));
+        let (table, origin) = resume(&self.table, row as usize, position);
+        Self {
+            table,
+            origin,
+            encoder: Arc::clone(&self.encoder),
+            reached: Vec::new(),
+            start: self.start,
+            resumed: true,
+        }
+        .encode()
+    }
+
+    fn row_at_position(&self, from: u64, position: [i64; 2]) -> Option<u64> {
+        let rows = self.table.rows.iter().zip(0..).skip(from as usize).take(UNACKNOWLEDGED);
+        let at = |row: &Row| self.encoder.reported_position(row.ticks, self.start);
+        rows.into_iter().find(|(row, _)| at(row) == position).map(|(_, index)| index)
+    }
+
+    /// As [`Program::stop_sequence`]; `sent` is not empty.
+    fn stop_sequence(&self, sent: &[Line]) -> Result<(Vec<Line>, u64), ProgramError> {
+        let last = self.reached.get(sent.len() - 1).or(self.reached.last()).copied().unwrap_or(0);
+        let (table, stopped) = stop_after(&self.table, last);
+        let origin: Vec<u64> = stopped.iter().map(|index| self.origin[*index as usize]).collect();
+        let row = origin.last().copied().unwrap_or(0);
+        let encoder = Arc::clone(&self.encoder);
+        let cut =
+            Self { table, origin, encoder, reached: Vec::new(), start: self.start, resumed: self.resumed };
+        let mut lines = cut.encode()?.lines;
+        // What was sent is the same up to here, but for the counts in a first line.
+        let mut tail = lines.split_off(sent.len().min(lines.len()));
+        if tail.is_empty() {
+            tail = self.encoder.lift(sent);
+        }
+        Ok((tail, row))
+    }
+}
+
+impl Program {
+    /// A plan's rows in the encoder's lines.
+    ///
+    /// # Errors
+    /// A plan without rows, or a row that the firmware cannot execute.
+    pub fn of_table(table: TickTable, encoder: Arc<dyn RowEncoder>) -> Result<Self, ProgramError> {
+        let start = table.rows.first().ok_or(ProgramError::Empty)?.ticks;
+        let origin = (0..table.rows.len() as u64).collect();
+        EncodedTable { table, encoder, origin, reached: Vec::new(), start, resumed: false }.encode()
+    }
+
+    /// Lines in the machine's own language.
+    pub fn of_lines(lines: Vec<Line>, language: Arc<dyn LineLanguage>) -> Self {
+        Self { lines, first_row: 0, source: Source::Language(language) }
+    }
+
+    /// Bytes of a file that are sent line by line as they are, line ends included. It can be stopped after any line;
+    /// what lifts the pen is not known.
+    pub fn opaque(text: &str) -> Self {
+        let line = |(row, text): (u64, &str)| Line { text: text.to_owned(), row, ..Line::default() };
+        let lines = (1..).zip(text.split_inclusive('\n')).map(line).collect();
+        Self { lines, first_row: 0, source: Source::Opaque }
+    }
+
+    /// The same from row `row` on. `position` is where the machine reports to be, where the program depends on it.
+    ///
+    /// # Errors
+    /// When there is no such row, or its rows cannot be encoded.
+    pub fn from_row(&self, row: u64, position: Option<[i64; 2]>) -> Result<Self, ProgramError> {
+        let language = match &self.source {
+            Source::Table(table) => return table.from_row(row, position),
+            Source::Language(language) => Some(language),
+            Source::Opaque => None,
+        };
+        let last = self.lines.last().map_or(0, |line| line.row);
+        if row > last {
+            return Err(ProgramError::NoRow { row, last });
+        }
+        let (done, rest) = self.lines.split_at(self.lines.partition_point(|line| line.row <= row));
+        let mut lines = language.map_or_else(Vec::new, |language| language.resume(done));
+        for line in &mut lines {
+            (line.row, line.duration_us) = (row, RESUME_LINE_US);
+        }
+        lines.extend_from_slice(rest);
+        Ok(Self { lines, first_row: row, source: self.source.clone() })
+    }
+
+    /// The row of a machine that reports `position`: row `from`, or one of those that it may have reached after it without
+    /// an acknowledgement. `None` if it is none of them.
+    pub fn row_at_position(&self, from: u64, position: [i64; 2]) -> Option<u64> {
+        let language = match &self.source {
+            Source::Table(table) => return table.row_at_position(from, position),
+            Source::Language(language) => language,
+            Source::Opaque => return None,
+        };
+        let tolerance = language.position_tolerance();
+        let near = |at: [i64; 2]| (0..2).all(|axis| at[axis].abs_diff(position[axis]) <= tolerance);
+        let mut here = None;
+        let mut found: Option<u64> = None;
+        for line in self.lines.iter().take_while(|line| line.row <= from + UNACKNOWLEDGED as u64) {
+            here = line.position.or(here);
+            if line.row >= from && here.is_some_and(near) {
+                found = found.or(Some(line.row));
+            }
+        }
+        found
+    }
+
+    /// The lines that lift the pen where the machine is, after the lines that are `done`.
+    pub fn lift(&self, done: &[Line]) -> Vec<Line> {
+        let row = done.last().map_or(0, |last| last.row);
+        match &self.source {
+            Source::Table(table) => {
+                let lift = table.encoder.lift(done).into_iter();
+                lift.map(|line| Line { row, ..line }).collect()
+            }
+            Source::Language(language) => {
+                let line = |text| Line { text, row, duration_us: LIFT_US, position: None };
+                language.lift().into_iter().map(line).collect()
+            }
+            Source::Opaque => Vec::new(),
+        }
+    }
+
+    /// What follows the first `sent` lines so that the machine comes to rest with the pen up, and the row where it then
+    /// is: the row for [`Self::from_row`].
+    pub fn stop_sequence(&self, sent: usize) -> (Vec<Line>, u64) {
+        let sent = &self.lines[..sent];
+        let Some(last) = sent.last() else { return (Vec::new(), self.first_row) };
+        let stop = match &self.source {
+            Source::Table(table) => table.stop_sequence(sent).ok(),
+            Source::Language(_) | Source::Opaque => None,
+        };
+        // Rows stretched in time may no longer fit the firmware's clock: then the pen at least goes up.
+        stop.unwrap_or_else(|| (self.lift(sent), last.row))
+    }
+
+    /// Replaces everything after the first `sent` lines by the stop sequence; the row where the machine then is.
+    pub(crate) fn stop_after(&mut self, sent: usize) -> u64 {
+        let (tail, row) = self.stop_sequence(sent);
+        self.lines.truncate(sent);
+        self.lines.extend(tail);
+        row
+    }
+
+    /// The row reached once the first `lines` lines are done.
+    pub(crate) fn row(&self, lines: usize) -> u64 {
+        lines.checked_sub(1).map_or(self.first_row, |last| self.lines[last].row)
+    }
+
+    /// How long all of it takes, microseconds.
+    pub fn duration_us(&self) -> u64 {
+        self.lines.iter().map(|line| line.duration_us).sum()
+    }
+
+    /// The rows, where the program is made of motor positions.
+    pub fn table(&self) -> Option<&TickTable> {
+        match &self.source {
+            Source::Table(table) => Some(&table.table),
+            _ => None,
+        }
+    }
+
+    /// The position that the machine reports at the start of the plan, where the program is made of motor positions.
+    pub fn start_position(&self) -> Option<[i64; 2]> {
+        match &self.source {
+            Source::Table(table) => Some(table.encoder.reported_position(table.start, table.start)),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Numbers and checksums of tick lines: `NUMBER:LINE*SUM` to the machine, `ok NUMBER*SUM` back.
+//!
+//! | to the machine | |
+//! |---|---|
+//! | `NUMBER:LINE*SUM` | a tick line. Line 0 begins a session and is the first line sent |
+//! | `where*SUM` | asks for the motors' positions |
+//!
+//! | from the machine | |
+//! |---|---|
+//! | `ok NUMBER*SUM` | every line before that number was accepted; this is the next one expected |
+//! | `error NUMBER WHY*SUM` | this line cannot be executed |
+//! | `at T1 T2 MOVING*SUM` | motor positions, and whether motion is queued (1) or not (0) |
+//! | `at unknown*SUM` | the machine was homed and has received nothing since |
+
+use crate::status::{Answer, StatusProtocol};
+use crate::transmission::sliding_window::{Framing, Reply};
+
+/// The exclusive or of all bytes, as Marlin's checksum.
+fn checksum(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |sum, byte| sum ^ byte)
+}
+
+/// `TEXT*SUM`.
+pub(crate) fn framed(text: &str) -> String {
+    format!("{text}*{}", checksum(text.as_bytes()))
+}
+
+/// The text of `TEXT*SUM`, or `None` if the checksum is wrong.
+pub(crate) fn unframed(line: &str) -> Option<&str> {
+    let (text, sum) = line.rsplit_once('*')?;
+    (sum.parse() == Ok(checksum(text.as_bytes()))).then_some(text)
+}
+
+/// The framing of numbered tick lines.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TickLineFraming;
+
+impl Framing for TickLineFraming {
+    fn frame(&self, number: usize, text: &str) -> String {
+        let mut line = framed(&format!("{number}:{text}"));
+        line.push('\n');
+        line
+    }
+
+    fn parse(&self, line: &str) -> Option<Reply> {
+        let mut words = unframed(line)?.splitn(3, ' ');
+        let (verb, number) = (words.next()?, words.next()?.parse().ok()?);
+        match verb {
+            "ok" => Some(Reply::Next(number)),
+            "error" => {
+                let why = words.next().unwrap_or("no reason given").to_owned();
+                Some(Reply::Error { number, why })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Position reports of a machine that reads numbered tick lines.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TickLineStatus;
+
+impl StatusProtocol for TickLineStatus {
+    fn line_end(&self) -> &'static str {
+        "\n"
+    }
+
+    fn query(&self) -> String {
+        framed("where") + "\n"
+    }
+
+    fn parse(&mut self, line: &str) -> Answer {
+        let Some(text) = unframed(line) else { return Answer::Other };
+        let words: Vec<&str> = text.split(' ').collect();
+        match words[..] {
+            ["at", "unknown"] => Answer::PositionUnknown,
+            ["at", a, b, moving] => match (a.parse(), b.parse()) {
+                (Ok(a), Ok(b)) => Answer::Status { position: [a, b], moving: moving != "0", holding: false },
+                _ => Answer::Other,
+            },
+            _ => Answer::Other,
+        }
+    }
+
+    fn describe(&self, [a, b]: [i64; 2]) -> String {
+        format!("{a}, {b} ticks")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn framed_line_matches_documentation() {
+        let documentation = include_str!("../../../../docs/sending.md");
+        assert!(documentation.contains(&format!("`{}`", framed("12:m 1 10000 804 -4"))));
+    }
+
+    #[test]
+    fn single_bit_error_fails_checksum() {
+        let line = framed("12:m 1 10000 804 -4");
+        for at in 0..line.len() {
+            for bit in 0..7 {
+                let mut bytes = line.clone().into_bytes();
+                bytes[at] ^= 1 << bit;
+                let changed = String::from_utf8_lossy(&bytes).into_owned();
+                assert_ne!(unframed(&changed), unframed(&line), "{changed}");
+            }
+        }
+    }
+}

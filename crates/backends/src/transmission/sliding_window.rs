@@ -1,0 +1,206 @@
+//! Sliding window (go-back-N): lines carry numbers and checksums, so they may be lost, doubled or garbled in either
+//! direction.
+//!
+//! A machine accepts a line if its checksum is right and its number is the next one, and answers anything with the number
+//! that it expects. So the sender may retransmit anything at any time: nothing is done twice, nothing is left out.
+
+use std::fmt;
+
+use crate::program::Program;
+use crate::session::{LineReader, Outcome, Progress, Session};
+
+/// A line is retransmitted after this and the time that it may wait for room, microseconds.
+const ACK_TIMEOUT_US: u64 = 1_000_000;
+/// Transmissions of a line without any progress before giving up.
+const TRIES: u32 = 12;
+/// Lines that may be queued in the machine before a new one is acknowledged.
+const QUEUE: usize = 48;
+
+/// What a line from the machine says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reply {
+    /// Every line before this number was accepted.
+    Next(usize),
+    /// This line cannot be executed.
+    Error {
+        /// The line's number.
+        number: usize,
+        /// The machine's reason.
+        why: String,
+    },
+}
+
+/// How lines are numbered and protected.
+pub trait Framing: fmt::Debug + Send {
+    /// A line as it is sent, with number, checksum and line end.
+    fn frame(&self, number: usize, text: &str) -> String;
+    /// Interprets a line from the machine; `None` for anything that is not an intact reply.
+    fn parse(&self, line: &str) -> Option<Reply>;
+}
+
+/// The session.
+#[derive(Debug)]
+pub struct SlidingWindow {
+    program: Program,
+    framing: Box<dyn Framing>,
+    /// Lines acknowledged.
+    acked: usize,
+    /// Lines sent since the last retransmission began.
+    sent: usize,
+    /// Lines sent at least once.
+    high_water_mark: usize,
+    window: usize,
+    reader: LineReader,
+    /// When the line after `acked` is retransmitted.
+    again_us: u64,
+    tries: u32,
+    stopping: Option<u64>,
+    failing: Option<Outcome>,
+    outcome: Option<Outcome>,
+    retransmitted: u64,
+}
+
+impl SlidingWindow {
+    /// With `window` lines in transit at once.
+    pub fn new(program: Program, framing: Box<dyn Framing>, window: usize) -> Self {
+        Self {
+            program,
+            framing,
+            acked: 0,
+            sent: 0,
+            high_water_mark: 0,
+            window: window.max(1),
+            reader: LineReader::default(),
+            again_us: 0,
+            tries: 0,
+            stopping: None,
+            failing: None,
+            outcome: None,
+            retransmitted: 0,
+        }
+    }
+
+    fn timeout_us(&self) -> u64 {
+        let lines = &self.program.lines;
+        let waiting = &lines[self.acked.saturating_sub(QUEUE)..self.sent.min(lines.len())];
+        ACK_TIMEOUT_US + waiting.iter().map(|line| line.duration_us).sum::<u64>()
+    }
+
+    /// The machine no longer answers.
+    fn give_up(&mut self, why: String) {
+        let Progress { row, last_sent_row, .. } = self.progress();
+        let failed = self.failing.take().unwrap_or(Outcome::Failed { row, last_sent_row, why });
+        self.outcome.get_or_insert(failed);
+    }
+
+    /// The machine cannot execute a line; it still listens, and lifts the pen where it is.
+    fn fail(&mut self, why: String) {
+        if self.failing.is_some() {
+            return self.give_up(why);
+        }
+        let row = self.program.row(self.acked);
+        self.failing = Some(Outcome::Failed { row, last_sent_row: row, why });
+        let lift = self.program.lift(&self.program.lines[..self.acked]);
+        self.program.lines.truncate(self.acked);
+        self.program.lines.extend(lift);
+        (self.sent, self.high_water_mark) = (self.acked, self.acked);
+    }
+
+    fn finish_if_done(&mut self) {
+        if self.acked == self.program.lines.len() && self.outcome.is_none() {
+            self.outcome = Some(match (self.failing.take(), self.stopping) {
+                (Some(failed), _) => failed,
+                (None, Some(row)) => Outcome::Stopped { row },
+                (None, None) => Outcome::Done,
+            });
+        }
+    }
+}
+
+impl Session for SlidingWindow {
+    fn receive(&mut self, bytes: &[u8], now_us: u64) {
+        for line in self.reader.add(bytes) {
+            match self.framing.parse(&line) {
+                Some(Reply::Next(next)) if next <= self.high_water_mark => {
+                    if next > self.acked {
+                        self.acked = next;
+                        self.tries = 0;
+                        self.again_us = now_us + self.timeout_us();
+                        self.sent = self.sent.max(next);
+                    } else if next == self.acked && self.sent > next {
+                        // It expects this line and has dropped those after it. They are answered too, so the
+                        // retransmission happens only once, and soon.
+                        self.again_us = self.again_us.min(now_us + ACK_TIMEOUT_US / 4);
+                    }
+                }
+                Some(Reply::Error { number, why }) => {
+                    self.fail(format!("the machine cannot execute line {number}: {why}"));
+                }
+                _ => {}
+            }
+        }
+        self.finish_if_done();
+    }
+
+    fn transmit(&mut self, now_us: u64) -> Vec<u8> {
+        self.finish_if_done();
+        if self.outcome.is_some() {
+            return Vec::new();
+        }
+        if self.sent > self.acked && now_us >= self.again_us {
+            self.tries += 1;
+            if self.tries > TRIES {
+                let received = self.reader.last_received();
+                self.give_up(format!("no answer to line {} after {TRIES} tries; {received}", self.acked));
+                return Vec::new();
+            }
+            self.sent = self.acked;
+        }
+        // Line 0 restarts the numbering: it must have been accepted before another follows.
+        let window = if self.acked == 0 { 1 } else { self.window };
+        let mut out = Vec::new();
+        while self.sent < self.program.lines.len() && self.sent < self.acked + window {
+            if self.sent == self.acked {
+                self.again_us = now_us;
+            }
+            self.retransmitted += u64::from(self.sent < self.high_water_mark);
+            out.extend(self.framing.frame(self.sent, &self.program.lines[self.sent].text).into_bytes());
+            self.sent += 1;
+            self.high_water_mark = self.high_water_mark.max(self.sent);
+            self.again_us = now_us + self.timeout_us();
+        }
+        out
+    }
+
+    fn wake_us(&self) -> Option<u64> {
+        (self.outcome.is_none() && self.sent > self.acked).then_some(self.again_us)
+    }
+
+    fn stop(&mut self, now_us: u64) {
+        if self.stopping.is_some() || self.failing.is_some() || self.outcome.is_some() {
+            return;
+        }
+        if self.high_water_mark == 0 {
+            self.outcome = Some(Outcome::Stopped { row: self.program.row(0) });
+            return;
+        }
+        self.stopping = Some(self.program.stop_after(self.high_water_mark));
+        self.again_us = self.again_us.max(now_us);
+    }
+
+    fn reconnected(&mut self, now_us: u64) {
+        self.reader.clear();
+        self.tries = 0;
+        self.again_us = now_us;
+    }
+
+    fn progress(&self) -> Progress {
+        let (row, last_sent_row) = (self.program.row(self.acked), self.program.row(self.high_water_mark));
+        let known = Progress::of(&self.program.lines, self.acked, row, last_sent_row);
+        Progress { retransmitted: self.retransmitted, ..known }
+    }
+
+    fn outcome(&self) -> Option<&Outcome> {
+        self.outcome.as_ref()
+    }
+}
