@@ -614,7 +614,7 @@ fn help_man_pages_and_completions() {
         "verify",
         "preview",
         "send",
-        "device",
+        "emulate",
         "machine list",
         "machine show",
         "machine check",

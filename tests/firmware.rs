@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use assert_cmd::cargo::cargo_bin;
-use backends::Ink;
-use backends::device::{Device, Ebb, Grbl};
+use backends::{Device, EmulatorOptions, Ink};
 use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::{Affine, Drawing, Rect};
 use kinematics::{
@@ -369,6 +368,11 @@ fn polar_csv_and_c_arrays_ink() {
     within("as written", &certificate, &drawing, TOLERANCE + 0.05 + 0.03 + degree + 0.1);
 }
 
+fn emulator(backend: &str) -> Box<dyn Device> {
+    let backend = backends::find(backend).expect("a backend");
+    backend.emulator(&EmulatorOptions::default()).expect("an emulator")
+}
+
 /// Sends lines to an emulator one by one, and waits until all motion is done.
 fn feed(device: &mut dyn Device, text: &str, end: char) -> Ink {
     let mut now_us = 0;
@@ -422,7 +426,7 @@ fn ebb_step_count_is_exact() {
                 {
                     let options = [&["--period", period], options].concat();
                     let text = convert(file, machine, format, &options);
-                    let ink = feed(&mut Ebb::new(), &text, '\r');
+                    let ink = feed(&mut *emulator("ebb"), &text, '\r');
                     let lines: Lines = ink
                         .lines()
                         .into_iter()
@@ -495,7 +499,7 @@ fn gcode_ink_with_arcs() {
                     "{file}: arcs"
                 );
                 assert!(text.lines().all(|line| line.len() < 80), "{file}: grbl takes 79 characters");
-                let ink = feed(&mut Grbl::new(), &as_grbl(&text), '\n').lines();
+                let ink = feed(&mut *emulator("gcode-grbl"), &as_grbl(&text), '\n').lines();
                 // Rounding to 3 decimals, and chord errors of arcs and ellipses.
                 let certificate = measure(&ruler, &drawing, &ink, FINE);
                 within(&format!("{file} {format} {pen:?}"), &certificate, &drawing, 0.015 + 0.011);
@@ -512,7 +516,7 @@ fn gcode_timed_ink_and_duration() {
         let plan = plan(file, machine, &[]);
         let drawing = with_one_pen(placed(file, &plan));
         let text = convert(file, machine, "gcode-timed", &[]);
-        let ink = feed(&mut Grbl::new(), &text, '\n').lines();
+        let ink = feed(&mut *emulator("gcode-grbl"), &text, '\n').lines();
         within(machine, &measure(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
         let mut seconds = 0.0;
         for line in text.lines() {

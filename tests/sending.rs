@@ -62,7 +62,7 @@ impl Desk {
     fn device(&self, protocol: &str, name: &str, options: &[&str]) -> Machinery {
         let ink = format!("{name}.csv");
         let svg = format!("{name}.svg");
-        let mut command = self.command(&["device", "--protocol", protocol, "--link", name, "-m", MACHINE]);
+        let mut command = self.command(&["emulate", "--protocol", protocol, "--link", name, "-m", MACHINE]);
         command.args(["--ink", &ink, "--svg", &svg]).args(options).stdout(Stdio::piped());
         let mut child = command.spawn().expect("the program runs");
         // It prints the name of the port when it can be opened.
@@ -170,7 +170,7 @@ fn faults_in_every_protocol_leave_ink_unchanged() {
                     let name = format!("tty-{protocol}-{number}");
                     // Enough time to open the port before it disappears.
                     let speedup = if fault.starts_with("unplugged") { "2" } else { SPEEDUP };
-                    let mut options = vec!["--haste", speedup];
+                    let mut options = vec!["--speedup", speedup];
                     if fault != "none" {
                         options.extend(["--fault", fault]);
                     }
@@ -199,7 +199,7 @@ fn resume_after_ctrl_c() {
                 scope.spawn(move || {
                     let what = format!("{protocol} stopped after {after_ms} ms");
                     let name = format!("tty-{protocol}-{after_ms}");
-                    let device = desk.device(protocol, &name, &["--haste", "2"]);
+                    let device = desk.device(protocol, &name, &["--speedup", "2"]);
                     let log = format!("{name}.log");
                     let mut sender = desk.send(protocol, &name, &["--log", &log]);
                     let sender = sender.stderr(Stdio::piped()).spawn().expect("the program runs");
@@ -231,10 +231,10 @@ fn lost_port_times_out() {
         desk.send("ticks", "tty", &["--reconnect", "500ms", "--log", "wire.log"]).output().expect("it runs");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(3), "{said}");
-    assert!(said.contains("tty has gone away") && said.contains("--from"), "{said}");
+    assert!(said.contains("tty was lost") && said.contains("--from"), "{said}");
     let log = std::fs::read_to_string(desk.path("wire.log")).expect("a log");
     assert!(
-        log.contains("> 0:begin 1 ") && log.contains("< ok 1*") && log.contains("! the port has gone away"),
+        log.contains("> 0:begin 1 ") && log.contains("< ok 1*") && log.contains("! the port was lost"),
         "{log}"
     );
     drop(device.ink());
@@ -278,7 +278,7 @@ fn send_reads_plans_and_firmware_formats() {
     desk.good(&["convert", "drawing.hpgl", "-m", MACHINE, "-f", "gcode-grbl", "-o", "arcs.gcode"]);
     let sent = |file: &str, protocol: &str| {
         let port = format!("tty-{file}-{protocol}");
-        let device = desk.device(protocol, &port, &["--haste", SPEEDUP]);
+        let device = desk.device(protocol, &port, &["--speedup", SPEEDUP]);
         desk.good(&["send", file, "--protocol", protocol, "--port", &port]);
         device.ink()
     };
@@ -307,13 +307,13 @@ fn send_reads_plans_and_firmware_formats() {
 fn pen_change_awaits_operator() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;SP2;PU100,200;PD300,200;PU;");
     let plan = desk.plan();
-    let device = desk.device("gcode", "tty", &["--haste", SPEEDUP]);
+    let device = desk.device("gcode", "tty", &["--speedup", SPEEDUP]);
     let mut sender = desk.send("gcode", "tty", &[]);
     let mut sender = sender.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
     std::io::Write::write_all(&mut sender.stdin.take().expect("its input"), b"\n").expect("it takes Enter");
     let output = sender.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success() && said.contains("waits for another pen"), "{said}");
+    assert!(output.status.success() && said.contains("waits for a pen change"), "{said}");
     let wanted: Lines = wanted("gcode", &plan).into_iter().map(|(_, line)| (1, line)).collect();
     assert_eq!(device.ink(), wanted);
 }
@@ -323,7 +323,7 @@ fn raw_and_paced_protocols() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;");
     let plan = desk.plan();
     // As fast as the emulator reads; its pseudo-terminal blocks the sender.
-    let device = desk.device("ticks", "tty-raw", &["--haste", SPEEDUP]);
+    let device = desk.device("ticks", "tty-raw", &["--speedup", SPEEDUP]);
     desk.good(&["send", "plan.ticks", "--protocol", "raw", "--port", "tty-raw"]);
     thread::sleep(Duration::from_secs(1));
     assert_eq!(device.ink(), wanted("ticks", &plan), "raw");

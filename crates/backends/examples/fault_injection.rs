@@ -1,20 +1,20 @@
-//! `cargo run --release -p plotplan-sending --example fault`: how many fault of each kind are tried in memory, and how often ink was
-//! lost or drawn twice. The table in docs/sending.md is what it prints.
+//! `cargo run --release -p plotplan-backends --example fault_injection`: injects faults of each kind in memory and counts how
+//! often ink was lost, drawn twice or out of place. The table in docs/sending.md is what it prints.
 
 #![allow(clippy::print_stdout, reason = "it prints a table")]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use backends::device::{Fault, FaultInjector};
-use backends::{Outcome, simulate};
-use common::{ALL, Protocol, Random, drawing, measure};
+use backends::{Fault, FaultInjector, Outcome, simulate};
+use common::{Random, Setup, backends, drawing, measure};
 use plan::TickTable;
 
 /// Runs of each kind and protocol.
 const RUNS: u64 = 2000;
+const HOUR_US: u64 = 3_600_000_000;
 
-/// A kind of fault: its name, and how to make one for a machine that gives so many answers in so many microseconds.
+/// A kind of fault: its name, and how to make one for a machine that gives this many answers in this many microseconds.
 type Kind = (&'static str, fn(&mut Random, u64, u64) -> Vec<Fault>);
 
 const KINDS: [Kind; 6] = [
@@ -43,66 +43,67 @@ const KINDS: [Kind; 6] = [
 ];
 
 /// Whether the plan is drawn to its end, as it is and once.
-fn holds(protocol: Protocol, table: &TickTable, faults: Vec<Fault>) -> bool {
-    let mut machine = FaultInjector::new(protocol.device(), faults);
-    let mut session = protocol.session(protocol.script(table));
-    let ended = simulate::run(&mut *session, &mut machine, 0, None, 3_600_000_000);
-    ended.outcome == Some(Outcome::Done) && machine.device().ink().lines() == protocol.wanted(table)
+fn holds(setup: Setup, table: &TickTable, faults: Vec<Fault>) -> bool {
+    let mut machine = FaultInjector::new(setup.device(), faults);
+    let mut session = setup.session(setup.program(table));
+    let ended = simulate::run(&mut *session, &mut machine, 0, None, HOUR_US);
+    ended.outcome == Some(Outcome::Done) && machine.device().ink().lines() == setup.wanted(table)
 }
 
-/// Whether a plan that is stopped at `stop_us` and gone on with is drawn as it is and once.
-fn holds_if_stopped(protocol: Protocol, table: &TickTable, stop_us: u64, faults: Vec<Fault>) -> bool {
-    let script = protocol.script(table);
-    let mut machine = FaultInjector::new(protocol.device(), faults);
-    let mut session = protocol.session(script.clone());
-    let ended = simulate::run(&mut *session, &mut machine, 0, Some(stop_us), 3_600_000_000);
+/// Whether a plan that is stopped at `stop_us` and resumed is drawn as it is and once.
+fn holds_if_stopped(setup: Setup, table: &TickTable, stop_us: u64, faults: Vec<Fault>) -> bool {
+    let program = setup.program(table);
+    let mut machine = FaultInjector::new(setup.device(), faults);
+    let mut session = setup.session(program.clone());
+    let ended = simulate::run(&mut *session, &mut machine, 0, Some(stop_us), HOUR_US);
     if let Some(Outcome::Stopped { row }) = ended.outcome {
-        let Ok(rest) = script.from_row(row, None) else { return false };
-        let mut session = protocol.session(rest);
-        let from_us = ended.at_us + 1_000_000;
-        let ended = simulate::run(&mut *session, &mut machine, from_us, None, 3_600_000_000);
+        let Ok(rest) = program.from_row(row, None) else { return false };
+        let mut session = setup.session(rest);
+        let ended = simulate::run(&mut *session, &mut machine, ended.at_us + 1_000_000, None, HOUR_US);
         if machine.device().pen_is_down() || ended.outcome != Some(Outcome::Done) {
             return false;
         }
     } else if ended.outcome != Some(Outcome::Done) {
         return false;
     }
-    machine.device().ink().lines() == protocol.wanted(table)
+    machine.device().ink().lines() == setup.wanted(table)
 }
 
 fn main() {
     let table = drawing();
     let mut random = Random(20);
-    println!("| fault | ticks | xy-serial | gcode | ebb |\n|---|---|---|---|---|");
-    let mut row = |name: &str, of: &mut dyn FnMut(Protocol, u64, u64, &mut Random) -> bool| {
-        let cells = ALL.map(|protocol| {
-            let (answers, duration_us) = measure(protocol, &table);
-            let wrong = (0..RUNS).filter(|_| !of(protocol, answers, duration_us, &mut random)).count();
+    let setups = backends();
+    let names: Vec<&str> =
+        setups.iter().filter_map(|setup| setup.backend.protocol()).map(|(name, _)| name).collect();
+    println!("| fault | {} |\n|---{}|", names.join(" | "), "|---".repeat(names.len()));
+    let mut row = |name: &str, of: &mut dyn FnMut(Setup, u64, u64, &mut Random) -> bool| {
+        let cells = setups.iter().map(|setup| {
+            let (answers, duration_us) = measure(*setup, &table);
+            let wrong = (0..RUNS).filter(|_| !of(*setup, answers, duration_us, &mut random)).count();
             format!("{wrong} of {RUNS}")
         });
-        println!("| {name} | {} |", cells.join(" | "));
+        println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
     };
     for (name, kind) in KINDS {
-        row(name, &mut |protocol, answers, duration_us, random| {
-            holds(protocol, &table, kind(random, answers, duration_us))
+        row(name, &mut |setup, answers, duration_us, random| {
+            holds(setup, &table, kind(random, answers, duration_us))
         });
     }
-    row("Ctrl-C, gone on with", &mut |protocol, _, duration_us, random| {
-        holds_if_stopped(protocol, &table, random.below(duration_us), Vec::new())
+    row("Ctrl-C, resumed", &mut |setup, _, duration_us, random| {
+        holds_if_stopped(setup, &table, random.below(duration_us), Vec::new())
     });
-    row("Ctrl-C and an answer lost", &mut |protocol, answers, duration_us, random| {
+    row("Ctrl-C and an answer lost", &mut |setup, answers, duration_us, random| {
         let faults = vec![Fault::LostAnswer(random.below(answers))];
-        holds_if_stopped(protocol, &table, random.below(duration_us), faults)
+        holds_if_stopped(setup, &table, random.below(duration_us), faults)
     });
-    let mut garbled = |protocol: Protocol| {
-        let wrong = (0..RUNS).filter(|_| {
-            let (lines, _) = measure(protocol, &table);
-            !holds(protocol, &table, vec![Fault::GarbledByte(random.below(lines * 25))])
-        });
-        wrong.count()
-    };
-    println!(
-        "| byte garbled on its way to the machine | {} of {RUNS} | - | - | - |",
-        garbled(Protocol::Ticks)
-    );
+    let cells = setups.iter().map(|setup| {
+        if !setup.detects_errors() {
+            return "-".to_owned();
+        }
+        let (lines, _) = measure(*setup, &table);
+        let wrong =
+            (0..RUNS).filter(|_| !holds(*setup, &table, vec![Fault::GarbledByte(random.below(lines * 25))]));
+        format!("{} of {RUNS}", wrong.count())
+    });
+    println!("| byte garbled on its way to the machine | {} |", cells.collect::<Vec<_>>().join(" | "));
 }

@@ -98,6 +98,11 @@ pub trait Backend: fmt::Debug + Send + Sync {
         None
     }
 
+    /// How long before its time a line is sent, of the lead asked for: 0 where the machine's answers set the pace.
+    fn lead_us(&self, _wanted_us: u64) -> u64 {
+        0
+    }
+
     /// Position reports, if the machine can be asked where it is.
     fn status(&self) -> Option<Box<dyn StatusProtocol>> {
         None

@@ -17,7 +17,7 @@
 use std::io::Write;
 
 use drawing::Point;
-use kinematics::{Geometry, Machine};
+use kinematics::Machine;
 use plan::Row;
 use plan::file::text::Text;
 
@@ -49,7 +49,7 @@ impl Backend for Commands {
     }
 
     fn check(&self, machine: &Machine) -> Result<(), Unrepresentable> {
-        if matches!(machine.geometry(), Geometry::TwoLink(_)) {
+        if machine.mechanism().kind() == "two-link" {
             return Ok(());
         }
         let machine = machine.name().to_owned();

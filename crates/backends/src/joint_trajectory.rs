@@ -7,6 +7,7 @@
 use std::io::Write;
 
 use crate::setpoint::{Setpoint, at_rest};
+use kinematics::JointKind;
 use plan::file::text::Text;
 
 use crate::WriteError;
@@ -40,8 +41,13 @@ impl Backend for JointTrajectory {
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
         let setpoints: Vec<Setpoint> = plan.setpoints(self.name())?.collect();
-        let geometry = plan.machine(self.name())?.geometry();
-        write(&setpoints, geometry.joint_names(), geometry.joint_is_angle(), out)
+        let mechanism = plan.machine(self.name())?.mechanism();
+        write(
+            &setpoints,
+            mechanism.joint_names(),
+            mechanism.joint_kinds().map(|kind| kind == JointKind::Revolute),
+            out,
+        )
     }
 }
 

@@ -29,12 +29,12 @@ const LIFT_US: u64 = 500_000;
 
 /// Encodes rows of motor positions as lines: what a program of rows needs in order to be stopped and resumed.
 pub trait RowEncoder: fmt::Debug + Send + Sync {
-    /// The lines of a plan; [`Line::row`] is an index into `table`. A `resumed` program must not reset what the machine
-    /// knows about its motors.
+    /// The lines of a plan that starts at `start` ticks; [`Line::row`] is an index into `table`. A `resumed` program must
+    /// not reset what the machine knows about its motors.
     ///
     /// # Errors
     /// A row that the firmware cannot execute.
-    fn lines(&self, table: &TickTable, resumed: bool) -> Result<Vec<Line>, Unrepresentable>;
+    fn lines(&self, table: &TickTable, start: [i64; 2], resumed: bool) -> Result<Vec<Line>, Unrepresentable>;
 
     /// The lines that lift the pen where the machine is, after the lines that are `done`.
     fn lift(&self, done: &[Line]) -> Vec<Line>;
@@ -182,7 +182,7 @@ fn with_rows(header: &Header, rows: Vec<Row>) -> TickTable {
 impl EncodedTable {
     /// Encodes it: the lines, with rows of the whole plan.
     fn encode(mut self) -> Result<Program, ProgramError> {
-        let mut lines = self.encoder.lines(&self.table, self.resumed)?;
+        let mut lines = self.encoder.lines(&self.table, self.start, self.resumed)?;
         self.reached = lines.iter().map(|line| line.row as usize).collect();
         for line in &mut lines {
             line.row = self.origin[line.row as usize];

@@ -1,7 +1,7 @@
 //! One instant of a plan with everything that encoders need: the row, the exact motor positions, the joints, the pen.
 
 use drawing::Point;
-use kinematics::{Joints, Machine};
+use kinematics::{Machine, MotorPos};
 use plan::Row;
 
 /// One instant of a plan, with what firmware formats need beside the row.
@@ -20,8 +20,8 @@ pub struct Setpoint {
 impl Setpoint {
     /// The setpoint of a row by the machine's forward kinematics.
     pub fn new(machine: &Machine, row: Row, exact_ticks: [f64; 2]) -> Self {
-        let joints = machine.joints(&Joints::from(exact_ticks));
-        Self { row, exact_ticks, joints: joints.into(), at: machine.geometry().forward(&joints) }
+        let joints = machine.joint_positions(&MotorPos::from(exact_ticks));
+        Self { row, exact_ticks, joints: joints.into(), at: machine.mechanism().forward(&joints) }
     }
 }
 

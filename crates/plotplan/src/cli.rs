@@ -1,5 +1,9 @@
 //! What can be said on the command line.
 
+use std::sync::LazyLock;
+
+use backends::{Backend, EncodeOptions, PenActuator};
+use clap::builder::PossibleValue;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -30,9 +34,10 @@ pub(crate) enum Command {
     Preview(Preview),
     /// Send a plan to a machine
     Send(Send),
-    /// Be a machine on a pseudo-terminal, to try senders on
+    /// Emulate a controller on a pseudo-terminal
     #[cfg(unix)]
-    Device(Device),
+    #[command(alias = "device")]
+    Emulate(Emulate),
     /// List, show and check machines
     #[command(subcommand)]
     Machine(Machine),
@@ -55,7 +60,7 @@ pub(crate) struct Convert {
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: String,
     /// What to write; `hpgl` and `svg` are the drawing as understood and need no machine
-    #[arg(short, long, value_enum, default_value_t = Format::Ticks)]
+    #[arg(short, long, value_enum, default_value = "ticks")]
     pub(crate) format: Format,
     /// With `--format hpgl`: write encoded polylines (PE) of HP-GL/2
     #[arg(long)]
@@ -74,10 +79,10 @@ pub(crate) struct Convert {
 /// How firmware formats move the pen.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct PenLift {
-    /// For G-code: what moves the pen. For ebb: `servo` takes S2 instead of SP
+    /// For G-code: what moves the pen. For ebb: `servo` uses S2 instead of SP
     #[arg(long, value_name = "HOW", value_enum)]
     pub(crate) pen_by: Option<PenBy>,
-    /// Positions with the pen up and down: S or degrees of a servo, mm of Z, twelfths of a microsecond for ebb
+    /// Positions with the pen up and down: S or degrees of a servo, mm of Z, 1/12 microseconds for ebb
     #[arg(long, value_name = "UP,DOWN", value_parser = positions, allow_hyphen_values = true)]
     pub(crate) pen_positions: Option<(i16, i16)>,
 }
@@ -89,6 +94,17 @@ pub(crate) enum PenBy {
     Servo,
     /// The Z axis
     Z,
+}
+
+impl PenLift {
+    /// The same for an encoder.
+    pub(crate) fn encode_options(self) -> EncodeOptions {
+        let pen_actuator = self.pen_by.map(|by| match by {
+            PenBy::Servo => PenActuator::Servo,
+            PenBy::Z => PenActuator::Z,
+        });
+        EncodeOptions { pen_actuator, pen_positions: self.pen_positions, legacy_moves: false }
+    }
 }
 
 /// How a drawing's file is read.
@@ -247,12 +263,12 @@ pub(crate) struct Preview {
 
 #[derive(Debug, Args)]
 pub(crate) struct Send {
-    /// Plan to send, or for gcode, xy-serial and raw a file in the machine's own words; `-` for standard input
+    /// Plan to send, or for gcode, xy-serial and raw a file in the machine's own language; `-` for standard input
     pub(crate) plan: String,
     /// Serial port
     #[arg(short, long, value_name = "PATH", required_unless_present = "dry_run")]
     pub(crate) port: Option<String>,
-    /// How to talk to the machine
+    /// Protocol of the machine
     #[arg(long, value_enum)]
     pub(crate) protocol: Protocol,
     /// Speed of the port
@@ -261,55 +277,77 @@ pub(crate) struct Send {
     /// Flow control of the port
     #[arg(long, value_enum, default_value_t = Flow::None)]
     pub(crate) flow: Flow,
-    /// Go on from this row of the plan: where a sync line is, or where it was stopped
+    /// Resume from this row of the plan: where it was stopped, or where a sync line is
     #[arg(long, value_name = "ROW")]
     pub(crate) from: Option<u64>,
-    /// Print what would be sent, with its time, and send nothing
+    /// Print every line with its time and send nothing
     #[arg(long)]
     pub(crate) dry_run: bool,
-    /// Write all that goes over the wire to this file
+    /// Write everything sent and received to this file
     #[arg(long, value_name = "FILE")]
     pub(crate) log: Option<String>,
-    /// For ticks: lines on the way at once [default: 8]. For gcode: bytes in the machine's buffer [default: 127]
+    /// For ticks: lines in transit at once [default: 8]. For gcode: size of the machine's receive buffer, bytes [default: 127]
     #[arg(long, value_name = "N")]
     pub(crate) window: Option<usize>,
-    /// For paced: how long before its time a line is sent
+    /// For paced: time by which lines are sent early
     #[arg(long, value_name = "TIME", default_value = "200ms", value_parser = time)]
     pub(crate) lead: f64,
-    /// How long to wait for a port that has gone away
+    /// How long to wait for a lost port to return
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time)]
     pub(crate) reconnect: f64,
     /// The machine, where the plan only knows its name and it is no preset
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
-    /// For ebb: SM moves, which every firmware knows
+    /// For ebb: SM moves, which every firmware version executes
     #[arg(long)]
     pub(crate) stepper_moves: bool,
     #[command(flatten)]
     pub(crate) pen: PenLift,
 }
 
-/// How to talk to a machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Protocol {
-    /// Tick lines with numbers and checksums, answered
-    Ticks,
-    /// The single-belt plotter's lines, answered by 1
-    XySerial,
-    /// G-code for grbl, grblHAL and FluidNC
-    Gcode,
-    /// EiBotBoard
-    Ebb,
-    /// Lines as they are, paced by the port's flow control
-    Raw,
-    /// Tick lines at their time, without answers or flow control
-    Paced,
+/// How to talk to a machine: a backend that has a protocol.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Protocol(pub(crate) &'static dyn Backend);
+
+impl ValueEnum for Protocol {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<Protocol>> = LazyLock::new(|| {
+            let all = backends::ALL.iter().copied();
+            all.filter(|backend| backend.protocol().is_some()).map(Protocol).collect()
+        });
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        self.0.protocol().map(|(name, help)| PossibleValue::new(name).help(help))
+    }
 }
 
-/// Who says when a port may be written to.
+/// A machine that can be emulated: a backend that has an emulator.
+#[cfg(unix)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Emulated(pub(crate) &'static dyn Backend);
+
+#[cfg(unix)]
+impl ValueEnum for Emulated {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<Emulated>> = LazyLock::new(|| {
+            let all = backends::ALL.iter().copied();
+            all.filter(|backend| backend.emulator_help().is_some()).map(Emulated).collect()
+        });
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, _) = self.0.protocol()?;
+        self.0.emulator_help().map(|help| PossibleValue::new(name).help(help))
+    }
+}
+
+/// Flow control of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Flow {
-    /// Nobody
+    /// None
     None,
     /// RTS and CTS
     Hardware,
@@ -319,48 +357,34 @@ pub(crate) enum Flow {
 
 #[cfg(unix)]
 #[derive(Debug, Args)]
-pub(crate) struct Device {
-    /// Which machine to be
+pub(crate) struct Emulate {
+    /// Machine to emulate
     #[arg(long, value_enum)]
-    pub(crate) protocol: DeviceProtocol,
-    /// Name to give the pseudo-terminal, as a link; it is printed either way
+    pub(crate) protocol: Emulated,
+    /// Symbolic link to make to the pseudo-terminal; its name is printed either way
     #[arg(long, value_name = "PATH")]
     pub(crate) link: Option<String>,
-    /// Where to draw what was drawn, at the end
+    /// Picture to write at the end, of what was drawn
     #[arg(long, value_name = "OUT.svg")]
     pub(crate) svg: Option<String>,
-    /// Where to write what was drawn as a table, at the end: line, pen, and place in the machine's own units
+    /// Table to write at the end, of what was drawn: line, pen, and position in the machine's own units
     #[arg(long, value_name = "OUT.csv")]
     pub(crate) ink: Option<String>,
-    /// Whose motors they are, for ticks and ebb: where they start, and what they draw
+    /// For ticks and ebb: the machine, for the motors' start and the picture
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
-    /// What goes wrong: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N
+    /// Fault to inject: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N
     #[arg(long, value_name = "FAULT", value_parser = fault)]
-    pub(crate) fault: Vec<backends::device::Fault>,
-    /// How many times faster than the clock it lives
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
-    pub(crate) haste: f64,
-    /// End when nothing has come in for so long, after something has; by its own clock
-    #[arg(long, value_name = "TIME", value_parser = time)]
-    pub(crate) rest: Option<f64>,
-    /// For xy-serial: it has homed before
+    pub(crate) fault: Vec<backends::Fault>,
+    /// Run this many times faster than real time
+    #[arg(long, alias = "haste", value_name = "FACTOR", default_value_t = 1.0)]
+    pub(crate) speedup: f64,
+    /// End when nothing was received for this time, after something was; by the emulated clock
+    #[arg(long, alias = "rest", value_name = "TIME", value_parser = time)]
+    pub(crate) idle_timeout: Option<f64>,
+    /// For xy-serial: homed before
     #[arg(long)]
     pub(crate) homed: bool,
-}
-
-/// The machines that can be tried.
-#[cfg(unix)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum DeviceProtocol {
-    /// A reader of tick lines, with or without numbers
-    Ticks,
-    /// The single-belt plotter
-    XySerial,
-    /// A grbl with its buffer of 128 bytes
-    Gcode,
-    /// An EiBotBoard
-    Ebb,
 }
 
 #[derive(Debug, Subcommand)]
@@ -399,50 +423,48 @@ pub(crate) struct Completions {
 }
 
 /// What convert writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Format {
-    /// Tick lines, for any serial sender
-    Ticks,
+    /// A firmware's format
+    Backend(&'static dyn Backend),
     /// A table of ticks against time
     Csv,
     /// A plan document with machine, settings and certificate
     Json,
-    /// The coaxial arm's command file, in ticks
-    CoaxialCommands,
-    /// The coaxial arm's command file, in inches
-    CoaxialCommandsInches,
-    /// Serial lines of the single-belt plotter
-    XySerial,
-    /// The polar robot's table; one stroke
-    PolarCsv,
-    /// The polar robot's points as C arrays; one stroke
-    CArrays,
-    /// EiBotBoard, firmware 2.7 and later
-    Ebb,
-    /// EiBotBoard, older firmware
-    EbbSm,
-    /// G-code for grbl, with arcs
-    GcodeGrbl,
-    /// G-code for FluidNC, with arcs
-    GcodeFluidnc,
-    /// G-code for Marlin, with arcs
-    GcodeMarlin,
-    /// G-code for Klipper, with arcs
-    GcodeKlipper,
-    /// G-code of the plan's rows with their times (G93), for grbl, FluidNC and LinuxCNC
-    GcodeTimed,
-    /// Klipper's step commands
-    KlipperSteps,
-    /// ROS JointTrajectory, as JSON
-    JointTrajectory,
-    /// Columns for LinuxCNC's halstreamer
-    Halstreamer,
-    /// Position, velocity and time of each motor
-    Pvt,
     /// The drawing as understood, as clean HP-GL
     Hpgl,
     /// The drawing as understood, as SVG in mm
     Svg,
+}
+
+impl Format {
+    fn name_and_help(self) -> Option<(&'static str, &'static str)> {
+        Some(match self {
+            Self::Backend(backend) => (backend.name(), backend.format_help()?),
+            Self::Csv => ("csv", "A table of ticks against time"),
+            Self::Json => ("json", "A plan document with machine, settings and certificate"),
+            Self::Hpgl => ("hpgl", "The drawing as understood, as clean HP-GL"),
+            Self::Svg => ("svg", "The drawing as understood, as SVG in mm"),
+        })
+    }
+}
+
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<Format>> = LazyLock::new(|| {
+            let written = backends::ALL.iter().copied().filter(|backend| backend.format_help().is_some());
+            let mut all: Vec<Format> = written.map(Format::Backend).collect();
+            // After the tick lines.
+            all.splice(1..1, [Format::Csv, Format::Json]);
+            all.extend([Format::Hpgl, Format::Svg]);
+            all
+        });
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        self.name_and_help().map(|(name, help)| PossibleValue::new(name).help(help))
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -496,8 +518,8 @@ fn positions(text: &str) -> Result<(i16, i16), String> {
 }
 
 #[cfg(unix)]
-fn fault(text: &str) -> Result<backends::device::Fault, String> {
-    use backends::device::Fault;
+fn fault(text: &str) -> Result<backends::Fault, String> {
+    use backends::Fault;
     let what = "a fault is KIND=N or KIND=N:TIME, such as lost-answer=5 or unplugged=2s:1s";
     let (kind, value) = text.split_once('=').ok_or(what)?;
     let (first, second) = value.split_once(':').map_or((value, None), |(a, b)| (a, Some(b)));

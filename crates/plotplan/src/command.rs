@@ -3,8 +3,7 @@
 mod check;
 mod convert;
 #[cfg(unix)]
-mod device;
-mod firmware;
+mod emulate;
 mod info;
 mod machine;
 mod preview;
@@ -32,7 +31,7 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Preview(preview) => preview::run(preview),
         Command::Send(send) => send::run(send),
         #[cfg(unix)]
-        Command::Device(device) => device::run(device),
+        Command::Emulate(emulate) => emulate::run(emulate),
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
             if explain.code == "plotters" {

@@ -11,6 +11,7 @@ mod port;
 #[cfg(unix)]
 mod pseudo_terminal;
 mod terminal;
+mod wire;
 
 fn main() -> ExitCode {
     use clap::{CommandFactory as _, FromArgMatches as _};

@@ -1,10 +1,22 @@
-//! A serial port, opened, read in the background, and opened again when it was away.
+//! Ports: a serial device, a pseudo-terminal or a TCP connection, read and written in the background, and opened again
+//! after it was lost.
 
 use std::io::{Read, Write};
+use std::net::{TcpStream, ToSocketAddrs as _};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
+use anyhow::Context as _;
 use serialport::FlowControl;
+
+/// Prefix of a port that is a TCP connection: `tcp:HOST:PORT`.
+const TCP: &str = "tcp:";
+/// How long a TCP connection may take to open.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Reads and writes return after this, so that a port that was closed is noticed.
+const IO_TIMEOUT: Duration = Duration::from_millis(20);
 
 /// How a port is set.
 #[derive(Clone, Debug)]
@@ -14,79 +26,104 @@ pub(crate) struct Settings {
     pub(crate) flow: FlowControl,
 }
 
-/// What comes from a port, or from whoever is in charge.
+/// What happens while a plan is sent.
 #[derive(Debug)]
 pub(crate) enum Event {
-    /// Bytes have come in.
-    Heard(Vec<u8>),
-    /// The port with this number has gone away.
+    /// The port delivered these bytes.
+    Received(Vec<u8>),
+    /// Everything handed to the port is written.
+    Written,
+    /// The port with this number was lost.
     Lost(u32),
-    /// Somebody wants it to stop.
+    /// SIGINT or SIGTERM.
     Interrupted,
-    /// Somebody has pressed Enter.
+    /// The operator pressed Enter.
     Enter,
 }
 
-/// An open port. What it hears goes to the channel that it was opened with.
+/// An open port. What it receives goes to the channel that it was opened with.
 pub(crate) struct Port {
-    out: Box<dyn Write + Send>,
-    /// What could not be written yet.
-    pending: Vec<u8>,
+    out: Sender<Vec<u8>>,
+    /// Bytes handed over and not written yet.
+    pending: Arc<AtomicUsize>,
 }
 
-/// A write that is held up by flow control for longer is tried again.
-const PATIENCE: Duration = Duration::from_millis(20);
-
 impl Port {
-    /// Opens it: as a serial port, or as the file it is where it is none.
-    pub(crate) fn open(settings: &Settings, number: u32, events: &Sender<Event>) -> std::io::Result<Self> {
-        let builder = serialport::new(&settings.path, settings.baud).timeout(PATIENCE);
-        let opened = builder.flow_control(settings.flow).open();
-        let (out, input): (Box<dyn Write + Send>, Box<dyn Read + Send>) = match opened {
-            Ok(port) => {
-                let input = port.try_clone()?;
-                (Box::new(port), Box::new(input))
-            }
-            Err(error) => {
-                // A pipe or a socket of a program that plays a port: no baud rate, but bytes.
-                let is_file = std::fs::metadata(&settings.path).is_ok_and(|data| !data.is_dir());
-                if !is_file || matches!(error.kind(), serialport::ErrorKind::NoDevice) {
-                    return Err(error.into());
-                }
-                let file = std::fs::OpenOptions::new().read(true).write(true).open(&settings.path)?;
-                (Box::new(file.try_clone()?), Box::new(file))
-            }
+    /// Opens it.
+    pub(crate) fn open(settings: &Settings, number: u32, events: &Sender<Event>) -> anyhow::Result<Self> {
+        let (out, input) = match settings.path.strip_prefix(TCP) {
+            Some(address) => connect(address)?,
+            None => open_serial(settings)?,
         };
+        let (sender, bytes) = channel();
+        let pending = Arc::new(AtomicUsize::new(0));
+        let writer = Writer { out, bytes, pending: Arc::clone(&pending), number, events: events.clone() };
+        std::thread::spawn(move || writer.run());
         let events = events.clone();
         std::thread::spawn(move || listen(input, number, &events));
-        Ok(Self { out, pending: Vec::new() })
+        Ok(Self { out: sender, pending })
     }
 
-    /// Whether everything has been written.
+    /// Whether everything is written.
     pub(crate) fn is_clear(&self) -> bool {
-        self.pending.is_empty()
+        self.pending.load(Ordering::Acquire) == 0
     }
 
-    /// Writes these bytes, as far as they can be written now; the rest at the next call.
-    pub(crate) fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        self.pending.extend_from_slice(bytes);
-        while !self.pending.is_empty() {
-            match self.out.write(&self.pending) {
-                Ok(0) => return Err(std::io::ErrorKind::WriteZero.into()),
-                Ok(count) => {
-                    self.pending.drain(..count);
-                }
-                Err(error) if is_pause(&error) => break,
-                Err(error) => return Err(error),
+    /// Writes these bytes in the background; a lost port reports itself.
+    pub(crate) fn write(&self, bytes: &[u8]) {
+        self.pending.fetch_add(bytes.len(), Ordering::AcqRel);
+        let _ = self.out.send(bytes.to_vec());
+    }
+}
+
+type Ends = (Box<dyn Write + Send>, Box<dyn Read + Send>);
+
+fn connect(address: &str) -> anyhow::Result<Ends> {
+    let addresses = address.to_socket_addrs().context("expected tcp:HOST:PORT")?;
+    let mut failed = None;
+    for address in addresses {
+        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {
+            Ok(stream) => {
+                // Lines are short, and the machine waits for them.
+                stream.set_nodelay(true)?;
+                stream.set_write_timeout(Some(IO_TIMEOUT))?;
+                return Ok((Box::new(stream.try_clone()?), Box::new(stream)));
             }
+            Err(error) => failed = Some(error),
         }
-        Ok(())
     }
+    Err(failed.map_or_else(|| anyhow::anyhow!("{address} has no address"), Into::into))
+}
 
-    /// Forgets what could not be written.
-    pub(crate) fn forget(&mut self) {
-        self.pending.clear();
-    }
+fn open_serial(settings: &Settings) -> anyhow::Result<Ends> {
+    refuse_other_files(&settings.path)?;
+    let builder = serialport::new(&settings.path, settings.baud).timeout(IO_TIMEOUT);
+    let port = builder.flow_control(settings.flow).open()?;
+    let input = port.try_clone()?;
+    Ok((Box::new(port), Box::new(input)))
+}
+
+/// Refuses what exists and is not a terminal: a regular file would be overwritten, and `/dev/null` never answers.
+#[cfg(unix)]
+fn refuse_other_files(path: &str) -> anyhow::Result<()> {
+    use std::io::IsTerminal as _;
+    use std::os::unix::fs::{FileTypeExt as _, OpenOptionsExt as _};
+
+    let what = "not a serial port (expected a serial device, a pseudo-terminal or tcp:HOST:PORT)";
+    let is_character_device = std::fs::metadata(path)?.file_type().is_char_device();
+    anyhow::ensure!(is_character_device, what);
+    // Without waiting for a modem's carrier.
+    let flags = (rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOCTTY).bits() as i32;
+    let file = std::fs::OpenOptions::new().read(true).write(true).custom_flags(flags).open(path)?;
+    anyhow::ensure!(file.is_terminal(), what);
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn refuse_other_files(path: &str) -> anyhow::Result<()> {
+    let is_file = std::fs::metadata(path).is_ok_and(|data| data.is_file());
+    anyhow::ensure!(!is_file, "not a serial port (expected COM1, COM2, ... or tcp:HOST:PORT)");
+    Ok(())
 }
 
 fn is_pause(error: &std::io::Error) -> bool {
@@ -98,7 +135,7 @@ fn listen(mut input: Box<dyn Read + Send>, number: u32, events: &Sender<Event>) 
     let mut buffer = [0; 4096];
     loop {
         let event = match input.read(&mut buffer) {
-            Ok(count) if count > 0 => Event::Heard(buffer[..count].to_vec()),
+            Ok(count) if count > 0 => Event::Received(buffer[..count].to_vec()),
             Err(error) if is_pause(&error) => continue,
             _ => Event::Lost(number),
         };
@@ -109,7 +146,37 @@ fn listen(mut input: Box<dyn Read + Send>, number: u32, events: &Sender<Event>) 
     }
 }
 
-/// Events of ports and of whoever is in charge.
+/// Writes in a thread of its own: flow control may block a write for any time, and the sender must stay responsive.
+struct Writer {
+    out: Box<dyn Write + Send>,
+    bytes: Receiver<Vec<u8>>,
+    pending: Arc<AtomicUsize>,
+    number: u32,
+    events: Sender<Event>,
+}
+
+impl Writer {
+    fn run(mut self) {
+        while let Ok(bytes) = self.bytes.recv() {
+            let mut rest = &bytes[..];
+            while !rest.is_empty() {
+                match self.out.write(rest) {
+                    Ok(count) if count > 0 => rest = &rest[count..],
+                    Err(error) if is_pause(&error) => {}
+                    _ => {
+                        let _ = self.events.send(Event::Lost(self.number));
+                        return;
+                    }
+                }
+            }
+            if self.pending.fetch_sub(bytes.len(), Ordering::AcqRel) == bytes.len() {
+                let _ = self.events.send(Event::Written);
+            }
+        }
+    }
+}
+
+/// Events of ports, signals and the operator.
 pub(crate) struct Events {
     pub(crate) sender: Sender<Event>,
     receiver: Receiver<Event>,
@@ -121,7 +188,7 @@ impl Events {
         Self { sender, receiver }
     }
 
-    /// Lets Ctrl-C and requests to end come as events.
+    /// Delivers SIGINT and SIGTERM as events.
     pub(crate) fn catch_interrupts(&self) -> Result<(), ctrlc::Error> {
         let sender = self.sender.clone();
         ctrlc::set_handler(move || {
@@ -129,7 +196,7 @@ impl Events {
         })
     }
 
-    /// Lets the next line of standard input come as an event.
+    /// Delivers the next line of standard input as an event.
     pub(crate) fn wait_for_enter(&self) {
         let sender = self.sender.clone();
         std::thread::spawn(move || {
@@ -139,7 +206,7 @@ impl Events {
         });
     }
 
-    /// The next event, if one comes in time.
+    /// The next event, if one arrives in time.
     pub(crate) fn next(&self, within: Duration) -> Option<Event> {
         self.receiver.recv_timeout(within).ok()
     }

@@ -127,11 +127,14 @@ struct EbbEncoder {
 }
 
 impl RowEncoder for EbbEncoder {
-    fn lines(&self, table: &TickTable, resumed: bool) -> Result<Vec<Line>, Unrepresentable> {
+    fn lines(&self, table: &TickTable, start: [i64; 2], resumed: bool) -> Result<Vec<Line>, Unrepresentable> {
         let mut lines = encode::lines(table.rows.iter().copied(), self.moves, self.pen)?;
         if resumed {
             // `EM` would clear the counters.
             lines.retain(|line| !line.text.starts_with("EM"));
+        }
+        for line in &mut lines {
+            line.position = Some(self.reported_position(table.rows[line.row as usize].ticks, start));
         }
         Ok(lines)
     }

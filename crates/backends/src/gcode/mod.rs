@@ -50,9 +50,13 @@ fn options(
     Ok(encode::Options {
         flavour,
         pen,
-        pen_s: [lift.lift_time, lift.drop_time],
+        pen_s: [lift.lift_time_s, lift.drop_time_s],
         // Without a travel speed of its own the pen travels as fast as the motors can, which is at least the drawing speed.
-        travel_mm_s: if lift.max_travel_speed.is_finite() { lift.max_travel_speed } else { lift.max_speed },
+        travel_mm_s: if lift.max_travel_speed_mm_s.is_finite() {
+            lift.max_travel_speed_mm_s
+        } else {
+            lift.max_speed_mm_s
+        },
         chord_mm: CHORD_MM,
     })
 }
@@ -104,8 +108,8 @@ impl Backend for Paths {
     ) -> Result<(), WriteError> {
         let options = options(self.0, self.name(), plan, encode)?;
         let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
-        let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, plan.rows(), machine.pen().max_speed);
-        let park = machine.geometry().forward(&machine.start());
+        let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, plan.rows(), machine.pen().max_speed_mm_s);
+        let park = machine.mechanism().forward(&machine.start());
         encode::write(&encode::paths(drawing, &speeds_mm_s, park, &options), out)
     }
 

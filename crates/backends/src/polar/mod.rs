@@ -6,7 +6,7 @@ mod points;
 
 use std::io::Write;
 
-use kinematics::{Geometry, Machine};
+use kinematics::Machine;
 
 use crate::backend::{Backend, EncodeOptions, PenNumbers, PlanSource};
 use crate::{Unrepresentable, WriteError};
@@ -20,7 +20,7 @@ pub(crate) struct PolarCsv;
 pub(crate) struct CArrays;
 
 fn check(machine: &Machine) -> Result<(), Unrepresentable> {
-    if matches!(machine.geometry(), Geometry::Polar(_)) {
+    if machine.mechanism().kind() == "polar" {
         return Ok(());
     }
     let machine = machine.name().to_owned();

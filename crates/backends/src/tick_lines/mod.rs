@@ -141,6 +141,10 @@ impl Backend for Paced {
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
         Some(Box::new(OpenLoop::new(program, "\n", Some(options.lead_us))))
     }
+
+    fn lead_us(&self, wanted_us: u64) -> u64 {
+        wanted_us
+    }
 }
 
 /// Rows as tick lines without comments, as [`tick_lines`] writes them.
@@ -148,7 +152,12 @@ impl Backend for Paced {
 struct TickLineEncoder;
 
 impl RowEncoder for TickLineEncoder {
-    fn lines(&self, table: &TickTable, _resumed: bool) -> Result<Vec<Line>, Unrepresentable> {
+    fn lines(
+        &self,
+        table: &TickTable,
+        _start: [i64; 2],
+        _resumed: bool,
+    ) -> Result<Vec<Line>, Unrepresentable> {
         let mut bytes = Vec::new();
         tick_lines::write(&table.header, table.rows.iter().copied(), &mut bytes)
             .map_err(|error| invalid(&error))?;

@@ -6,7 +6,7 @@ mod encode;
 use std::io::Write;
 use std::sync::Arc;
 
-use kinematics::{Geometry, Machine};
+use kinematics::Machine;
 
 use crate::backend::{
     Backend, EmulatorOptions, EncodeOptions, InkFrame, PenNumbers, PlanSource, SessionOptions,
@@ -55,9 +55,9 @@ impl Backend for XySerial {
     }
 
     fn check(&self, machine: &Machine) -> Result<(), Unrepresentable> {
-        let coupling = machine.coupling().matrix();
-        let is = |rows: [[f64; 2]; 2]| (0..2).all(|i| (0..2).all(|j| coupling[(i, j)] == rows[i][j]));
-        if matches!(machine.geometry(), Geometry::Cartesian(_)) && is([[1.0, 1.0], [-1.0, 1.0]]) {
+        let coupling = machine.coupling().rows();
+        let is = |rows: [[f64; 2]; 2]| (0..2).all(|i| (0..2).all(|j| coupling[i][j] == rows[i][j]));
+        if machine.mechanism().kind() == "cartesian" && is([[1.0, 1.0], [-1.0, 1.0]]) {
             return Ok(());
         }
         let machine = machine.name().to_owned();

@@ -1,4 +1,4 @@
-//! Plans, protocols and machines to try.
+//! Plans and every emulated backend to send them to.
 
 #![allow(
     dead_code,
@@ -7,13 +7,12 @@
     reason = "each user takes its part; plans made here are sound"
 )]
 
-use backends::asking::Asking;
-use backends::device::{Device, Ebb, FaultInjector, Grbl, Ticks, XyPlotter};
-use backends::numbered::Numbered;
-use backends::repeating::Repeating;
-use backends::{Ink, Script, Session, simulate};
-use backends::{Setpoint, ebb, gcode};
-use drawing::Point;
+use backends::{
+    ALL, Backend, Device, EmulatorOptions, EncodeOptions, FaultInjector, Ink, InkFrame, PenActuator,
+    PenNumbers, PlanSource, Program, RowIter, Session, SessionOptions, simulate,
+};
+use drawing::Rect;
+use kinematics::{Cartesian, JointPos, JointRange, Machine, MachineParts, PenLimits};
 use plan::{Header, Limits, Motor, Row, TickTable};
 
 /// Where plans start, ticks.
@@ -83,81 +82,119 @@ pub fn drawing() -> TickTable {
     ])
 }
 
-/// Motors straight on x and y, 50 ticks a mm, the plan in the middle of seed 2's range.
-fn setpoints(table: &TickTable) -> impl Iterator<Item = Setpoint> + '_ {
-    table.rows.iter().map(|row| {
-        let exact = row.ticks.map(|ticks| ticks as f64);
-        let at = Point::new(60.0 + exact[0] / 50.0, 60.0 + exact[1] / 50.0);
-        Setpoint { row: *row, exact, joints: [at.x, at.y], at }
+/// A Cartesian machine with 50 ticks a mm whose plans lie in the middle of the single-belt plotter's range.
+pub fn machine() -> Machine {
+    let motor = |name: &str| kinematics::Motor {
+        name: name.into(),
+        ticks_per_unit: 50.0,
+        offset_ticks: -3000.0,
+        max_speed_ticks_s: 4000.0,
+        max_acceleration_ticks_s2: 40_000.0,
+        max_jerk_ticks_s3: None,
+    };
+    Machine::new(MachineParts {
+        name: "made up".into(),
+        mechanism: std::sync::Arc::new(Cartesian),
+        joints: [JointRange::FREE; 2],
+        min_manipulability: 0.0,
+        coupling: [[1.0, 0.0], [0.0, 1.0]],
+        motors: [motor("a"), motor("b")],
+        pen: PenLimits {
+            max_speed_mm_s: 80.0,
+            max_travel_speed_mm_s: f64::INFINITY,
+            lift_time_s: 0.15,
+            drop_time_s: 0.15,
+        },
+        sheet: Rect::new(0.0, 0.0, 250.0, 250.0),
+        start: JointPos::from([76.0, 60.0]),
+        period_s: 0.01,
     })
+    .unwrap()
 }
 
-fn options() -> gcode::Options {
-    gcode::Options {
-        flavour: gcode::Flavour::Grbl,
-        pen: gcode::Pen::Servo { up: 40, down: 90 },
-        pen_s: [0.15, 0.15],
-        travel_mm_s: 80.0,
-        chord_mm: 0.01,
-    }
+/// A backend with an emulator, and how its programs move the pen.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    pub backend: &'static dyn Backend,
+    pub encode: EncodeOptions,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Protocol {
-    Ticks,
-    XySerial,
-    Gcode,
-    Ebb,
+/// The pen settings of the command line: default, actuator, positions, both.
+fn pen_settings() -> Vec<EncodeOptions> {
+    let actuators = [None, Some(PenActuator::Servo), Some(PenActuator::Z)];
+    let positions = [None, Some((30, 80))];
+    let all = actuators.into_iter().flat_map(|pen_actuator| {
+        positions.map(|pen_positions| EncodeOptions { pen_actuator, pen_positions, legacy_moves: false })
+    });
+    all.collect()
 }
 
-pub const ALL: [Protocol; 4] = [Protocol::Ticks, Protocol::XySerial, Protocol::Gcode, Protocol::Ebb];
+/// Every backend that can be emulated with its default pen setting.
+pub fn backends() -> Vec<Setup> {
+    let emulated = ALL.iter().copied().filter(|backend| backend.emulator_help().is_some());
+    emulated.map(|backend| Setup { backend, encode: EncodeOptions::default() }).collect()
+}
 
-impl Protocol {
-    pub fn script(self, table: &TickTable) -> Script {
-        match self {
-            Self::Ticks => Script::ticks(table.clone()),
-            Self::XySerial => Script::xy_serial(setpoints(table)).unwrap(),
-            Self::Gcode => Script::gcode(gcode::timed(setpoints(table), &options(), false)),
-            Self::Ebb => Script::ebb(table.clone(), ebb::Moves::Timed, ebb::Pen::Toggle).unwrap(),
+/// Every backend that can be emulated with every pen setting that changes its program.
+pub fn setups() -> Vec<Setup> {
+    let table = small();
+    let mut setups: Vec<(Setup, Vec<String>)> = Vec::new();
+    for Setup { backend, .. } in backends() {
+        for encode in pen_settings() {
+            let setup = Setup { backend, encode };
+            let lines: Vec<String> = setup.program(&table).lines.into_iter().map(|line| line.text).collect();
+            if setups.iter().all(|(_, known)| *known != lines) {
+                setups.push((setup, lines));
+            }
         }
     }
+    setups.into_iter().map(|(setup, _)| setup).collect()
+}
 
-    pub fn session(self, script: Script) -> Box<dyn Session> {
-        match self {
-            Self::Ticks => Box::new(Numbered::new(script, 8)),
-            Self::XySerial => Box::new(Repeating::new(script)),
-            Self::Gcode => Box::new(Asking::new(script, 127)),
-            Self::Ebb => Box::new(Asking::new(script, 0)),
-        }
+impl Setup {
+    pub fn of(name: &str) -> Self {
+        Self { backend: backends::find(name).unwrap(), encode: EncodeOptions::default() }
+    }
+
+    pub fn program(self, table: &TickTable) -> Program {
+        let rows =
+            || -> RowIter<'_> { Box::new(table.rows.iter().map(|row| (*row, row.ticks.map(|t| t as f64)))) };
+        let machine = machine();
+        let source = PlanSource::new(&table.header, &rows).on_machine(&machine);
+        self.backend.program(&source, &self.encode).unwrap()
+    }
+
+    pub fn session(self, program: Program) -> Box<dyn Session> {
+        self.backend.session(program, &SessionOptions::default()).unwrap()
     }
 
     pub fn device(self) -> Box<dyn Device> {
-        match self {
-            Self::Ticks => Box::new(Ticks::new(Some(HOME))),
-            Self::XySerial => Box::new(XyPlotter::new(false, 0.0)),
-            Self::Gcode => Box::new(Grbl::new()),
-            Self::Ebb => Box::new(Ebb::new()),
-        }
+        let options = EmulatorOptions { start: Some(HOME), homed: false, answers_within_mm: 0.0 };
+        self.backend.emulator(&options).unwrap()
     }
 
-    /// The ink that is wanted, in the machine's own units, from the plan's rows alone.
+    /// Whether the protocol's lines have checksums.
+    pub fn detects_errors(self) -> bool {
+        self.backend.name() == "ticks"
+    }
+
+    /// The expected ink in the machine's own units, from the plan's rows alone.
     pub fn wanted(self, table: &TickTable) -> Vec<(u16, Vec<[f64; 2]>)> {
-        let of = |place: &dyn Fn(&Setpoint) -> [f64; 2], one_pen: bool| {
-            let mut ink = Ink::default();
-            let all: Vec<Setpoint> = setpoints(table).collect();
-            for pair in all.windows(2) {
-                let pen = if one_pen { pair[0].row.pen.min(1) } else { pair[0].row.pen };
-                ink.pen(pen, place(&pair[0]));
-                ink.go(place(&pair[1]));
+        let position = |row: &Row| match self.backend.ink_frame() {
+            InkFrame::Ticks => row.ticks.map(|ticks| ticks as f64),
+            InkFrame::TicksFromStart => [0, 1].map(|motor| (row.ticks[motor] - HOME[motor]) as f64),
+            InkFrame::Millimetres(decimals) => {
+                let unit = (0..decimals).fold(1.0, |unit, _| unit * 10.0);
+                row.ticks.map(|ticks| ((60.0 + ticks as f64 / 50.0) * unit).round() / unit)
             }
-            ink.lines()
         };
-        match self {
-            Self::Ticks => of(&|i| i.exact, false),
-            Self::XySerial => of(&|i| [i.at.x, i.at.y].map(|mm| (mm * 10.0).round() / 10.0), true),
-            Self::Gcode => of(&|i| [i.at.x, i.at.y].map(|mm| (mm * 1000.0).round() / 1000.0), true),
-            Self::Ebb => of(&|i| [0, 1].map(|m| i.exact[m] - HOME[m] as f64), true),
+        let sent = self.backend.pens() == PenNumbers::Sent;
+        let mut ink = Ink::default();
+        for pair in table.rows.windows(2) {
+            ink.pen(if sent { pair[0].pen } else { pair[0].pen.min(1) }, position(&pair[0]));
+            ink.go(position(&pair[1]));
         }
+        ink.lines()
     }
 }
 
@@ -172,10 +209,10 @@ impl Random {
 }
 
 /// How many answers a machine gives to the whole plan, and how long that takes.
-pub fn measure(protocol: Protocol, table: &TickTable) -> (u64, u64) {
-    let lines = protocol.script(table).steps.len() as u64;
-    let mut machine = FaultInjector::new(protocol.device(), Vec::new());
-    let mut session = protocol.session(protocol.script(table));
+pub fn measure(setup: Setup, table: &TickTable) -> (u64, u64) {
+    let lines = setup.program(table).lines.len() as u64;
+    let mut machine = FaultInjector::new(setup.device(), Vec::new());
+    let mut session = setup.session(setup.program(table));
     let ended = simulate::run(&mut *session, &mut machine, 0, None, 3_600_000_000);
     (lines, ended.at_us)
 }

@@ -1,14 +1,14 @@
 //! `plotplan convert`: a drawing into a plan, or into a clean drawing.
 
 use annotate_snippets::Level;
+use backends::{Backend, PlanSource, RowIter, WriteError};
 use compiler::import;
 use compiler::pipeline::{self, Compiled, Request};
 use compiler::report::{CertificateReport, Summary, text};
 use compiler::settings::Settings;
 use drawing::Drawing;
 use kinematics::Machine;
-use planner::PlanError;
-use planner::{PlacementOptions, Scale, place};
+use planner::{ExactRow, PlacementOptions, PlanError, Scale, place};
 use serde_json::json;
 
 use crate::cli::{Convert, Format, ReportForm};
@@ -97,8 +97,8 @@ fn plan(
     if !compiled.certificate.holds {
         terminal::warning("the plan breaks the motors' limits, which was allowed");
     }
-    if super::firmware::is_for(arguments.format) {
-        super::firmware::write(arguments, &machine.machine, &compiled)?;
+    if let Format::Backend(backend) = arguments.format {
+        write_encoded(arguments, backend, &machine.machine, &compiled)?;
         terminal::say(&said);
         return Ok(());
     }
@@ -121,7 +121,7 @@ fn plan(
                 };
                 plan::file::json::write(&document, &compiled.header, rows, out)
             }
-            _ => plan::file::tick_lines::write(&compiled.header, rows(), out),
+            _ => return Err(std::io::Error::other("a format of a drawing")),
         };
         written.map_err(|error| match error {
             plan::file::WriteError::Io(error) => error,
@@ -130,6 +130,46 @@ fn plan(
     })?;
     terminal::say(&said);
     Ok(())
+}
+
+/// Writes the plan in a firmware's format, and warns of what the format cannot carry.
+fn write_encoded(
+    arguments: &Convert,
+    backend: &dyn Backend,
+    machine: &Machine,
+    compiled: &Compiled<'_>,
+) -> Result<(), Failure> {
+    backend.check(machine).map_err(|error| Failure::Drawing(error.into()))?;
+    let pens: Vec<u16> = compiled.ordered().pens().into_iter().map(|pen| pen.0).collect();
+    let losses = backend.losses(&compiled.header, &pens);
+    for loss in &losses {
+        terminal::warning(&loss.to_string());
+    }
+    if arguments.reading.strict && !losses.is_empty() {
+        terminal::error(input::STRICT);
+        return Err(Failure::Refused);
+    }
+    let rows = || -> RowIter<'_> {
+        Box::new(compiled.trajectory.rows().map(|ExactRow { row, exact }| (row, exact)))
+    };
+    let source = PlanSource::new(&compiled.header, &rows).on_machine(machine).of_drawing(compiled.ordered());
+    let mut refused = None;
+    let written = output::write(&arguments.output, |out| {
+        backend.write(&source, &arguments.pen.encode_options(), out).map_err(|error| match error {
+            WriteError::Io(error) => error,
+            other => {
+                let kind = std::io::Error::other("not representable");
+                refused = Some(other);
+                kind
+            }
+        })
+    });
+    match refused {
+        Some(error) => {
+            Err(Failure::Drawing(anyhow::Error::new(error).context("this format cannot represent the plan")))
+        }
+        None => written,
+    }
 }
 
 /// Compiles with progress, and explains where it cannot be done.
