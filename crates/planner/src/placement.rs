@@ -8,11 +8,26 @@ use crate::error::PlanError;
 /// Where and how large to place a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacementOptions {
-    /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding
+    /// Reflection of the drawing, before the rotation. The lower-left corner of the ink's bounding
     /// box stays in place.
+    pub mirror: Option<Mirror>,
+    /// Counterclockwise rotation of the drawing, rad. The lower-left corner of the ink's bounding box
+    /// stays in place.
     pub rotate_rad: f64,
     /// Size and position.
     pub scale: Scale,
+    /// Distance that [`Scale::Aligned`], [`Scale::Fit`] and [`Scale::Shrink`] keep from the edges of
+    /// the sheet, mm.
+    pub margin_mm: f64,
+}
+
+/// A reflection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mirror {
+    /// Left and right swap: x becomes -x.
+    X,
+    /// Top and bottom swap: y becomes -y.
+    Y,
 }
 
 /// The size of the placed drawing and the position of its origin.
@@ -25,15 +40,30 @@ pub enum Scale {
         /// Position of the drawing's (0, 0), in mm from the sheet's lower-left corner.
         origin_mm: Vec2,
     },
-    /// As large as the sheet and the machine's reach allow, as close to the sheet's center as
-    /// possible at that size.
+    /// Scaled by a factor; the ink's bounding box is then aligned with the sheet less its margin.
+    Aligned {
+        /// The factor; 1 keeps the drawing's size.
+        factor: f64,
+        /// Position of the box between the left (0) and right (1) edge, and between the bottom (0)
+        /// and top (1) edge.
+        align: Vec2,
+    },
+    /// As large as the sheet less its margin and the machine's reach allow, as close to the sheet's
+    /// center as possible at that size.
     Fit,
+    /// As [`Self::Fit`], but never larger than the drawing itself.
+    Shrink,
 }
 
 impl Default for PlacementOptions {
     /// Actual size, with the drawing's origin at the sheet's lower-left corner.
     fn default() -> Self {
-        Self { rotate_rad: 0.0, scale: Scale::Explicit { factor: 1.0, origin_mm: Vec2::ZERO } }
+        Self {
+            mirror: None,
+            rotate_rad: 0.0,
+            scale: Scale::Explicit { factor: 1.0, origin_mm: Vec2::ZERO },
+            margin_mm: 0.0,
+        }
     }
 }
 
@@ -51,28 +81,48 @@ pub fn place(machine: &Machine, drawing: &Drawing, options: &PlacementOptions) -
     if !options.rotate_rad.is_finite() {
         return Err(setting("the rotation must be a finite angle"));
     }
-    let rotation = rotation_about_corner(drawing, bounds, options.rotate_rad);
+    let sheet = machine.sheet();
+    let margin = options.margin_mm;
+    let inside = sheet.inset(-margin);
+    // Sheets may be unbounded: a margin only matters where an edge is finite.
+    if !(margin >= 0.0 && margin.is_finite() && inside.x0 < inside.x1 && inside.y0 < inside.y1) {
+        return Err(setting("the margin must leave some of the sheet"));
+    }
+    let rotation = rotation_about_corner(drawing, bounds, options.mirror, options.rotate_rad);
+    let valid = |factor: f64| factor > 0.0 && factor.is_finite();
     match options.scale {
         Scale::Explicit { factor, origin_mm } => {
-            if !(factor > 0.0 && factor.is_finite() && origin_mm.is_finite()) {
+            if !(valid(factor) && origin_mm.is_finite()) {
                 return Err(setting("the scale must be a positive number and the place finite"));
             }
-            let sheet = machine.sheet();
             let corner = Vec2::new(sheet.x0, sheet.y0) + origin_mm;
             Ok(Affine::translate(corner) * Affine::scale(factor) * rotation)
         }
-        Scale::Fit => {
+        Scale::Aligned { factor, align } => {
+            if !valid(factor) {
+                return Err(setting("the scale must be a positive number"));
+            }
+            let scaled = Affine::scale(factor) * rotation;
+            let mut placed = drawing.clone();
+            placed.transform(scaled);
+            let ink = placed.bounding_box().unwrap_or(bounds);
+            let free = inside.size() - ink.size();
+            let corner = Vec2::new(inside.x0 + align.x * free.width, inside.y0 + align.y * free.height);
+            Ok(Affine::translate(corner - Vec2::new(ink.x0, ink.y0)) * scaled)
+        }
+        Scale::Fit | Scale::Shrink => {
             let mut rotated = drawing.clone();
             rotated.transform(rotation);
-            Ok(fit(machine, &rotated)? * rotation)
+            let largest = if options.scale == Scale::Fit { f64::INFINITY } else { 1.0 };
+            Ok(fit(machine, inside, &rotated, largest)? * rotation)
         }
     }
 }
 
-/// The rotation that keeps the lower-left corner of the ink's bounding box in place. Multiples of
-/// 90 degrees are exact.
-fn rotation_about_corner(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine {
-    if angle == 0.0 {
+/// The reflection and rotation that keep the lower-left corner of the ink's bounding box in place.
+/// Multiples of 90 degrees are exact.
+fn rotation_about_corner(drawing: &Drawing, bounds: Rect, mirror: Option<Mirror>, angle: f64) -> Affine {
+    if angle == 0.0 && mirror.is_none() {
         return Affine::IDENTITY;
     }
     let quarters = angle / std::f64::consts::FRAC_PI_2;
@@ -81,7 +131,12 @@ fn rotation_about_corner(drawing: &Drawing, bounds: Rect, angle: f64) -> Affine 
     } else {
         libm::sincos(angle)
     };
-    let rotation = Affine::new([cos, sin, -sin, cos, 0.0, 0.0]);
+    let reflection = match mirror {
+        None => Affine::IDENTITY,
+        Some(Mirror::X) => Affine::new([-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        Some(Mirror::Y) => Affine::new([1.0, 0.0, 0.0, -1.0, 0.0, 0.0]),
+    };
+    let rotation = Affine::new([cos, sin, -sin, cos, 0.0, 0.0]) * reflection;
     let mut turned = drawing.clone();
     turned.transform(rotation);
     let after = turned.bounding_box().unwrap_or(bounds);
@@ -95,21 +150,21 @@ const GRID: i32 = 24;
 /// Relative precision of the scale.
 const PRECISION: f64 = 1e-4;
 
-/// The largest scale, with its translation, at which all ink lies on the sheet and within reach.
+/// The largest scale up to `most`, with its translation, at which all ink lies on `sheet` and within
+/// reach.
 ///
 /// The set of placements that fit need not be convex (the half ring of a polar machine has a hole
 /// that a drawing may enclose), so this is a search: bisection over the scale, and for each scale a
 /// grid of translations from the center outwards, refined around the best. The search looks at a
-/// sample of the ink. The exact check of every segment then either accepts the placement or returns
-/// a violating point, which is added to the sample, and the search continues. Deterministic: ties
-/// are broken by the order of the grid.
-fn fit(machine: &Machine, drawing: &Drawing) -> Result<Affine, PlanError> {
+/// sample of the ink. The exact check of every segment then either accepts the placement or returns a
+/// violating point, which is added to the sample, and the search continues. Deterministic: ties are
+/// broken by the order of the grid.
+fn fit(machine: &Machine, sheet: Rect, drawing: &Drawing, most: f64) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
-    let sheet = machine.sheet();
     let mut search = Search { machine, sheet, bounds, points: sample(drawing, bounds) };
     let across = if bounds.width() > 0.0 { sheet.width() / bounds.width() } else { f64::INFINITY };
     let up = if bounds.height() > 0.0 { sheet.height() / bounds.height() } else { f64::INFINITY };
-    let largest = across.min(up);
+    let largest = across.min(up).min(most);
     // A single dot has no extent: it keeps its scale.
     let largest = if largest.is_finite() { largest } else { 1.0 };
     let mut high = largest;
@@ -132,8 +187,8 @@ struct Search<'a> {
     machine: &'a Machine,
     sheet: Rect,
     bounds: Rect,
-    /// The sample. A point that rules out a translation moves to the front, since it is likely to
-    /// rule out the next one.
+    /// The sample. A point that rules out a translation moves to the front, since it is likely to rule
+    /// out the next one.
     points: Vec<Point>,
 }
 
@@ -176,8 +231,8 @@ impl Search<'_> {
         (scale, shift)
     }
 
-    /// The translation nearest to the center, on the grid, that puts the scaled sample on the sheet
-    /// and within reach.
+    /// The translation nearest to the center, on the grid, that puts the scaled sample on the sheet and
+    /// within reach.
     fn translation(&mut self, scale: f64) -> Option<Vec2> {
         let (bounds, sheet) = (self.bounds, self.sheet);
         let low = Vec2::new(sheet.x0 - scale * bounds.x0, sheet.y0 - scale * bounds.y0);
@@ -202,8 +257,8 @@ impl Search<'_> {
     }
 }
 
-/// The points of a grid over the square from -1 to 1, `2 half + 1` per side, sorted by their
-/// distance from the center.
+/// The points of a grid over the square from -1 to 1, `2 half + 1` per side, sorted by their distance
+/// from the center.
 fn from_center(half: i32) -> Vec<(f64, f64)> {
     let mut cells: Vec<(i32, i32)> =
         (-half..=half).flat_map(|y| (-half..=half).map(move |x| (x, y))).collect();
@@ -217,8 +272,8 @@ fn on_sheet(sheet: Rect, p: Point) -> bool {
     p.x >= sheet.x0 - slack && p.x <= sheet.x1 + slack && p.y >= sheet.y0 - slack && p.y <= sheet.y1 + slack
 }
 
-/// Points of the ink: one for every cell of a grid over its bounding box that the ink passes
-/// through, and its extreme points.
+/// Points of the ink: one for every cell of a grid over its bounding box that the ink passes through,
+/// and its extreme points.
 fn sample(drawing: &Drawing, bounds: Rect) -> Vec<Point> {
     let side = bounds.width().max(bounds.height()) / SAMPLES_PER_SIDE;
     let mut taken = std::collections::BTreeSet::new();

@@ -66,7 +66,7 @@ fn drawing() -> impl Strategy<Value = Drawing> {
 }
 
 fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {
-    let options = PlacementOptions { rotate_rad: 0.0, scale: Scale::Fit };
+    let options = PlacementOptions { scale: Scale::Fit, ..PlacementOptions::default() };
     let mut placed = drawing.clone();
     placed.transform(place(machine, drawing, &options).expect("it fits"));
     placed

@@ -70,7 +70,7 @@ pub(super) fn run(python: &str) -> Result<bool> {
     let tenth_emission = emission_seconds(&machine, &tenth_plan)?;
     let arm = arm()?;
     let mut fitted = once.clone();
-    fitted.transform(place(&arm, &once, &PlacementOptions { rotate_rad: 0.0, scale: Scale::Fit })?);
+    fitted.transform(place(&arm, &once, &PlacementOptions { scale: Scale::Fit, ..PlacementOptions::default() })?);
     let arm_trajectory = planner::plan(&arm, fitted, &settings)?;
     let arm_emission = self::emission(&arm, &arm_trajectory)?;
 
