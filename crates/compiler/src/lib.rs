@@ -7,6 +7,7 @@
 
 pub mod import;
 pub mod machine_file;
+pub mod paper;
 pub mod pipeline;
 pub mod quantity;
 pub mod replay;

@@ -5,7 +5,7 @@
 use drawing::{Affine, Drawing, Pen, Point};
 use kinematics::{JointPos, Machine};
 use plan::{Header, Limits, Motor};
-use planner::placement::{self, PlacementOptions};
+use planner::PlacementOptions;
 use planner::{PlanError, Settings, TimingLaw, Trajectory};
 use verify::Certificate;
 
@@ -133,11 +133,11 @@ pub struct Placed {
 /// # Errors
 /// When the drawing has no ink, cannot be placed, or leaves the machine's reach.
 pub fn place(drawing: &Drawing, machine: &Machine, options: &PlacementOptions) -> Result<Placed, PlanError> {
-    let placement = placement::place(machine, drawing, options)?;
+    let placement = planner::place(machine, drawing, options)?;
     let mut drawing = drawing.clone();
     drawing.transform(placement);
     planner::check_reach(machine, &drawing)?;
-    let beyond_sheet_mm = placement::beyond_sheet_mm(machine, &drawing);
+    let beyond_sheet_mm = planner::beyond_sheet_mm(machine, &drawing);
     Ok(Placed { placement, drawing, beyond_sheet_mm })
 }
 

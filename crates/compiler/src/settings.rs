@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use planner::placement::Scale;
-use planner::{Easing, TimingLaw};
+use planner::{Easing, Mirror, PlacementOptions, Scale, TimingLaw};
 use serde::Serialize;
 
 use crate::import;
@@ -60,14 +59,20 @@ pub struct OrderingSettings {
 /// The placement asked for.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlacementSettings {
-    /// Whether the drawing was fitted to sheet and reach.
-    pub fit: bool,
+    /// `explicit`, `aligned`, `fit` or `shrink`.
+    pub kind: &'static str,
+    /// Reflection before the rotation: `x` or `y`.
+    pub mirror: Option<&'static str>,
     /// Counterclockwise rotation, rad.
     pub rotate_rad: f64,
-    /// The scale; `null` under `fit`.
+    /// The scale; `null` under `fit` and `shrink`.
     pub scale: Option<f64>,
-    /// The drawing's origin from the sheet's lower left corner, mm; `null` under `fit`.
+    /// The drawing's origin from the sheet's lower left corner, mm, where `explicit`.
     pub origin_mm: Option<[f64; 2]>,
+    /// Position between the left (bottom) edge, 0, and the right (top) edge, 1, where `aligned`.
+    pub align: Option<[f64; 2]>,
+    /// Margin of the sheet, mm.
+    pub margin_mm: f64,
 }
 
 impl Settings {
@@ -94,10 +99,6 @@ impl Settings {
                 pen_order: options.pen_order.as_ref().map(|pens| pens.iter().map(|pen| pen.0).collect()),
             }),
         };
-        let (scale, origin_mm) = match request.placement.scale {
-            Scale::Fit => (None, None),
-            Scale::Explicit { factor, origin_mm: o } => (Some(factor), Some([o.x, o.y])),
-        };
         Self {
             program: concat!("plotplan ", env!("CARGO_PKG_VERSION")).to_owned(),
             command_line,
@@ -107,17 +108,29 @@ impl Settings {
             period_us: request.period_us,
             order: request.order.name(),
             ordering,
-            placement: PlacementSettings {
-                fit: request.placement.scale == Scale::Fit,
-                rotate_rad: request.placement.rotate_rad,
-                scale,
-                origin_mm,
-            },
+            placement: PlacementSettings::of(&request.placement),
             pen_speeds_mm_s: request.pen_speeds.iter().map(|(pen, speed)| (pen.0, *speed)).collect(),
             lift_overlap_s: request.lift_overlap_s,
             law,
             segment_time_s,
             allow_over_limit: request.allow_over_limit,
         }
+    }
+}
+
+impl PlacementSettings {
+    fn of(options: &PlacementOptions) -> Self {
+        let (kind, scale, origin_mm, align) = match options.scale {
+            Scale::Explicit { factor, origin_mm: o } => ("explicit", Some(factor), Some([o.x, o.y]), None),
+            Scale::Aligned { factor, align } => ("aligned", Some(factor), None, Some([align.x, align.y])),
+            Scale::Fit => ("fit", None, None, None),
+            Scale::Shrink => ("shrink", None, None, None),
+        };
+        let mirror = options.mirror.map(|mirror| match mirror {
+            Mirror::X => "x",
+            Mirror::Y => "y",
+        });
+        let PlacementOptions { rotate_rad, margin_mm, .. } = *options;
+        Self { kind, mirror, rotate_rad, scale, origin_mm, align, margin_mm }
     }
 }

@@ -344,6 +344,17 @@ impl Machine {
         }
     }
 
+    /// The same machine with a sheet of this size, mm, whose lower-left corner takes the place of
+    /// that of the present one.
+    ///
+    /// # Errors
+    /// [`MachineError::EmptySheet`] and the like for a size that is not positive and finite.
+    pub fn with_sheet_size(&self, width_mm: f64, height_mm: f64) -> Result<Self, MachineError> {
+        let corner = Point::new(self.parts.sheet.x0, self.parts.sheet.y0);
+        let sheet = Rect::from_origin_size(corner, (width_mm, height_mm));
+        Self::new(MachineParts { sheet, ..self.parts.clone() })
+    }
+
     /// What it was made of.
     pub fn parts(&self) -> &MachineParts {
         &self.parts

@@ -23,22 +23,15 @@
 //! From a machine and a line to rows of ticks, and a line out of reach:
 //! ```
 //! use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
-//! use kinematics::{Cartesian, Geometry, Joint, JointPos, Machine, MachineParts, Motor, PenLimits};
+//! use kinematics::{Cartesian, JointRange, Machine, MachineParts, Mechanism as _, Motor};
 //! use planner::{PlanError, Settings, plan};
 //!
-//! let axis = |name: &str| Motor {
-//!     name: name.into(), ticks_per_unit: 80.0, offset_ticks: 0.0,
-//!     max_speed_ticks_s: 8000.0, max_acceleration_ticks_s2: 80_000.0, max_jerk_ticks_s3: None,
-//! };
-//! let machine = Machine::new(MachineParts {
-//!     name: "table".into(), mechanism: std::sync::Arc::new(Cartesian),
-//!     joints: [JointRange { min: 0.0, max: 300.0 }; 2], min_manipulability: 0.0,
-//!     coupling: [[1.0, 0.0], [0.0, 1.0]], motors: [axis("x"), axis("y")],
-//!     pen: PenLimits {
-//!         max_speed_mm_s: 100.0, max_travel_speed_mm_s: 100.0, lift_time_s: 0.1, drop_time_s: 0.1,
-//!     },
-//!     sheet: Rect::new(0.0, 0.0, 300.0, 300.0), start: JointPos::ZERO, period_s: 0.01,
-//! })?;
+//! let motors = ["x", "y"].map(|name| Motor::new(name, 80.0, 100.0, 1000.0));
+//! let sheet = Rect::new(0.0, 0.0, 300.0, 300.0);
+//! let mut parts = MachineParts::new("table", Cartesian, motors, sheet);
+//! parts.joints = [JointRange { min: 0.0, max: 300.0 }; 2];
+//! parts.start = Cartesian.inverse(Point::ZERO)?;
+//! let machine = Machine::new(parts)?;
 //! let line = |to: Point| -> Option<Drawing> {
 //!     let points = vec![Point::new(10.0, 10.0), to];
 //!     Some(Drawing { strokes: vec![Stroke::polyline(Pen(1), points, Span::default())?] })
@@ -64,7 +57,7 @@
 mod error;
 mod joint_path;
 mod path;
-pub mod placement;
+mod placement;
 mod settings;
 mod stroke;
 mod time_parametrization;
@@ -72,7 +65,7 @@ mod trajectory;
 mod travel;
 
 pub use error::PlanError;
-pub use placement::{PlacementOptions, Scale, place};
+pub use placement::{Mirror, PlacementOptions, Scale, beyond_sheet_mm, place};
 pub use settings::{Settings, TimingLaw};
 pub use time_parametrization::{Easing, LimitingConstraints};
 pub use trajectory::{ExactRow, Rows, Times, Trajectory, check_reach, plan};

@@ -116,8 +116,8 @@ pub(crate) struct Reading {
     /// Plotter that the file was made for (see `plotplan explain plotters`); found out from the file if not given
     #[arg(long, value_name = "NAME")]
     pub(crate) plotter: Option<String>,
-    /// Paper of that plotter
-    #[arg(long, value_name = "NAME", requires = "plotter")]
+    /// The sheet on the machine: A4, A3,landscape, letter or WxH. With --plotter: the paper of that plotter
+    #[arg(long, value_name = "PAPER")]
     pub(crate) paper: Option<String>,
     /// How to write diagnostics to standard error
     #[arg(long, value_enum, default_value_t = MessageFormat::Human)]
@@ -130,7 +130,8 @@ pub(crate) struct Reading {
 impl Reading {
     /// The options of the drawing's importer.
     pub(crate) fn options(&self) -> import::Options {
-        import::Options { plotter: self.plotter.clone(), paper: self.paper.clone() }
+        let paper = self.plotter.as_ref().and(self.paper.clone());
+        import::Options { plotter: self.plotter.clone(), paper }
     }
 }
 
@@ -185,18 +186,46 @@ pub(crate) struct Planning {
     /// Write the plan even if it breaks the motors' limits, as laws with a given time may; the report says where
     #[arg(long)]
     pub(crate) allow_over_limit: bool,
-    /// Scale and move the drawing to the largest size that sheet and machine allow
-    #[arg(long, conflicts_with_all = ["place", "scale"])]
+    #[command(flatten)]
+    pub(crate) placement: Placement,
+}
+
+/// Where a drawing goes on the sheet.
+#[derive(Debug, Args)]
+pub(crate) struct Placement {
+    /// Enlarge or reduce the drawing to the largest size that sheet, margin and machine allow
+    #[arg(long, conflicts_with_all = ["place", "scale", "align", "shrink"])]
     pub(crate) fit: bool,
-    /// Put the drawing's origin so far from the sheet's lower-left corner
+    /// As --fit, but never enlarge
+    #[arg(long, conflicts_with_all = ["place", "scale", "align"])]
+    pub(crate) shrink: bool,
+    /// Align the ink with the sheet less its margin: center, left, right, top, bottom, top-left, ...
+    #[arg(long, value_name = "WHERE", conflicts_with = "place", value_parser = align)]
+    pub(crate) align: Option<(f64, f64)>,
+    /// Move the drawing's origin to X,Y from the sheet's lower-left corner
     #[arg(long, value_name = "X,Y", value_parser = place, allow_hyphen_values = true)]
     pub(crate) place: Option<(f64, f64)>,
-    /// Scale the drawing about its origin
-    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    /// Scale the drawing about its origin: 0.5 or 50%
+    #[arg(long, value_name = "FACTOR|PERCENT%", value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: Option<f64>,
-    /// Turn the drawing counterclockwise, its lower-left corner staying in place
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    /// Rotate the drawing counterclockwise, in degrees, its lower-left corner staying in place
+    #[arg(long, value_name = "ANGLE", value_parser = angle, allow_hyphen_values = true)]
     pub(crate) rotate: Option<f64>,
+    /// Mirror the drawing before rotating it: x swaps left and right, y swaps top and bottom
+    #[arg(long, value_enum)]
+    pub(crate) mirror: Option<Mirror>,
+    /// Distance that --fit, --shrink and --align keep from the edges of the sheet
+    #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = length)]
+    pub(crate) margin: f64,
+}
+
+/// A reflection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Mirror {
+    /// Left and right
+    X,
+    /// Top and bottom
+    Y,
 }
 
 #[derive(Debug, Args)]
@@ -505,6 +534,42 @@ pub(crate) enum Speed {
     Machine,
     /// The file's (VS) where it gives one, and never more than the machine's
     File,
+}
+
+fn align(text: &str) -> Result<(f64, f64), String> {
+    let (mut x, mut y) = (0.5, 0.5);
+    for word in text.split('-') {
+        match word {
+            "left" => x = 0.0,
+            "right" => x = 1.0,
+            "bottom" => y = 0.0,
+            "top" => y = 1.0,
+            "center" | "centre" | "middle" => {}
+            _ => {
+                return Err("expected center, left, right, top, bottom or a corner such as top-left".into());
+            }
+        }
+    }
+    Ok((x, y))
+}
+
+fn scale(text: &str) -> Result<f64, String> {
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    let factor = number.trim().parse::<f64>().ok().map(|factor| factor * unit);
+    factor
+        .filter(|factor| *factor > 0.0 && factor.is_finite())
+        .ok_or_else(|| "expected a positive factor such as 0.5, or a percentage such as 50%".to_owned())
+}
+
+/// An angle in rad; a bare number is in degrees.
+fn angle(text: &str) -> Result<f64, String> {
+    let degrees = text.trim().parse::<f64>().ok().filter(|degrees| degrees.is_finite());
+    match degrees {
+        Some(degrees) => Ok(degrees.to_radians()),
+        None => quantity::angle_rad(text).map_err(|_| {
+            "expected an angle in degrees such as 90, or with a unit such as 1.57rad".to_owned()
+        }),
+    }
 }
 
 fn length(text: &str) -> Result<f64, String> {

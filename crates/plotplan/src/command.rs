@@ -13,9 +13,9 @@ mod verify;
 use clap::CommandFactory as _;
 use compiler::import::{self, Page, PenSettings};
 use compiler::pipeline::{Order, Request};
-use drawing::Pen;
+use drawing::{Pen, Vec2};
 use kinematics::Machine;
-use planner::{Easing, PlacementOptions, Scale, TimingLaw};
+use planner::{Easing, Mirror, PlacementOptions, Scale, TimingLaw};
 
 use crate::cli::{self, Arguments, Command, Planning};
 use crate::failure::Failure;
@@ -67,14 +67,8 @@ fn manual(command: Option<&str>) -> Result<(), Failure> {
     output::write("-", |out| clap_mangen::Man::new(page).render(out))
 }
 
-/// The request that the command line's words make, for this page on this machine.
+/// The request that the options ask for, for this page on this machine.
 fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
-    let size = if planning.fit {
-        Scale::Fit
-    } else {
-        let (x, y) = planning.place.unwrap_or((0.0, 0.0));
-        Scale::Explicit { factor: planning.scale.unwrap_or(1.0), origin_mm: drawing::Vec2::new(x, y) }
-    };
     let order = match planning.order {
         cli::Order::File => Order::File,
         cli::Order::Optimize => Order::Optimize(ordering::Options {
@@ -97,7 +91,7 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
         tolerance_mm: planning.tolerance,
         period_us: (period * 1e6).round().max(0.0) as u64,
         order,
-        placement: PlacementOptions { rotate_rad: planning.rotate.unwrap_or(0.0).to_radians(), scale: size },
+        placement: placement(&planning.placement),
         pen_speeds,
         // The pen is off the paper long before it is all the way up.
         lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
@@ -106,7 +100,30 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
     }
 }
 
-/// The law that the command line's words make.
+/// The placement that the options ask for.
+fn placement(options: &cli::Placement) -> PlacementOptions {
+    let scale = if options.fit {
+        Scale::Fit
+    } else if options.shrink {
+        Scale::Shrink
+    } else if let Some((x, y)) = options.align {
+        Scale::Aligned { factor: options.scale.unwrap_or(1.0), align: Vec2::new(x, y) }
+    } else {
+        let (x, y) = options.place.unwrap_or((0.0, 0.0));
+        Scale::Explicit { factor: options.scale.unwrap_or(1.0), origin_mm: Vec2::new(x, y) }
+    };
+    PlacementOptions {
+        mirror: options.mirror.map(|mirror| match mirror {
+            cli::Mirror::X => Mirror::X,
+            cli::Mirror::Y => Mirror::Y,
+        }),
+        rotate_rad: options.rotate.unwrap_or(0.0),
+        scale,
+        margin_mm: options.margin,
+    }
+}
+
+/// The timing law that the options ask for.
 fn timing_law(planning: &Planning) -> TimingLaw {
     let fixed_duration =
         |easing: Easing| TimingLaw::FixedDuration { easing, segment_time_s: planning.segment_time };

@@ -17,7 +17,11 @@ pub(crate) fn write(
             .and_then(|()| out.flush())
             .map_err(|error| Failure::writing(error, "standard output"));
     }
-    // A link keeps standing, and what it points to is written.
+    if let Some(input) = crate::input::same_as(Path::new(to)) {
+        let what = format!("{to} is the input {input}: an output does not replace an input");
+        return Err(Failure::Usage(anyhow::anyhow!(what)));
+    }
+    // Through a link: the link stays, its target is written.
     let resolved = std::fs::canonicalize(to);
     let path = resolved.as_deref().unwrap_or(Path::new(to));
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

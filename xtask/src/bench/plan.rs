@@ -8,11 +8,11 @@ use std::process::Command;
 use anyhow::{Context as _, Result};
 use drawing::{Drawing, Point, Rect, Segment};
 use kinematics::{Cartesian, JointPos, JointRange, Machine, MachineParts, Motor, PenLimits, TwoLink};
-use planner::placement::{PlacementOptions, Scale, place};
 use planner::unstable::{
     CornerBlend, JointPath, PathBudget, PathGeometry, Profile, SpeedCap, profile, profile_without_refinement,
     sections,
 };
+use planner::{PlacementOptions, Scale, place};
 use planner::{Settings, Trajectory};
 
 use super::{fastest, workload};
@@ -70,7 +70,11 @@ pub(super) fn run(python: &str) -> Result<bool> {
     let tenth_emission = emission_seconds(&machine, &tenth_plan)?;
     let arm = arm()?;
     let mut fitted = once.clone();
-    fitted.transform(place(&arm, &once, &PlacementOptions { scale: Scale::Fit, ..PlacementOptions::default() })?);
+    fitted.transform(place(
+        &arm,
+        &once,
+        &PlacementOptions { scale: Scale::Fit, ..PlacementOptions::default() },
+    )?);
     let arm_trajectory = planner::plan(&arm, fitted, &settings)?;
     let arm_emission = self::emission(&arm, &arm_trajectory)?;
 

@@ -8,10 +8,15 @@ use compiler::report::text::{length, pluralize};
 
 use crate::cli::Check;
 use crate::failure::Failure;
+use crate::machines;
 use crate::{input, output, terminal};
 
 pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
-    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let machine = arguments
+        .machine
+        .as_deref()
+        .map(|name| machines::machine_with_paper(name, &arguments.reading))
+        .transpose()?;
     let input = input::read(&arguments.file)?;
     let drawn = input::drawing(&input, &arguments.reading)?;
     let document = &drawn.document;

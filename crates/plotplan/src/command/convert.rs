@@ -3,17 +3,18 @@
 use annotate_snippets::Level;
 use backends::{Backend, PlanSource, RowIter, WriteError};
 use compiler::import;
-use compiler::pipeline::{self, Compiled, Request};
+use compiler::pipeline::{self, Compiled, Order, Request};
 use compiler::report::{CertificateReport, Summary, text};
 use compiler::settings::Settings;
-use drawing::Drawing;
+use drawing::{Drawing, Vec2};
 use kinematics::Machine;
-use planner::{ExactRow, PlacementOptions, PlanError, Scale, place};
+use planner::{ExactRow, PlacementOptions, PlanError, Scale};
 use serde_json::json;
 
 use crate::cli::{Convert, Format, ReportForm};
 use crate::failure::Failure;
-use crate::input::{self, Input, LoadedDrawing, LoadedMachine};
+use crate::input::{self, Input, LoadedDrawing};
+use crate::machines::{self, LoadedMachine};
 use crate::output;
 use crate::terminal::{self, Progress};
 
@@ -21,7 +22,7 @@ pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Fa
     // What is wrong with the machine shows before a long read.
     let machine = match (arguments.format, &arguments.machine) {
         (Format::Hpgl | Format::Svg, _) => None,
-        (_, Some(name)) => Some(input::machine(name)?),
+        (_, Some(name)) => Some(machines::machine_with_paper(name, &arguments.reading)?),
         (_, None) => {
             let what = "which machine is the plan for? Give --machine NAME (see `plotplan machine list`) or --machine FILE.toml";
             return Err(Failure::Usage(anyhow::anyhow!(what)));
@@ -212,18 +213,42 @@ pub(super) fn explain(
         machine.sheet().x1,
         machine.sheet().y1,
     );
-    let fit = PlacementOptions { scale: Scale::Fit, ..request.placement };
-    let help = match place(machine, drawing, &fit) {
-        Ok(map) => {
-            let [a, b, ..] = map.as_coeffs();
-            format!(
-                "--fit makes it fit, scaled by {:.4}; or choose --scale, --rotate and --place",
-                libm::hypot(a, b)
-            )
-        }
-        Err(_) => "--scale, --rotate and --place move it".to_owned(),
-    };
+    let help = what_fits(drawing, machine, request);
     let title = format!("the drawing leaves the reach of {}: {source}", machine.name());
     terminal::at_place(input, *span, Level::ERROR, None, &title, &place_text, Some(&help));
     Failure::Refused
+}
+
+/// A placement that is known to work, or the options that change it.
+fn what_fits(drawing: &Drawing, machine: &Machine, request: &Request) -> String {
+    /// Planning to the end costs time: beyond this many strokes a placement is checked for reach only.
+    const PLANNED_STROKES: usize = 2_000;
+    let works = |scale: Scale| {
+        let placement = PlacementOptions { scale, ..request.placement };
+        let placed = pipeline::place(drawing, machine, &placement).ok()?;
+        let planned = Request { placement, order: Order::File, ..request.clone() };
+        let holds = drawing.strokes.len() > PLANNED_STROKES
+            || pipeline::compile(drawing, machine, &planned, &|_| {}).is_ok();
+        (holds && placed.beyond_sheet_mm <= 1e-6).then(|| placed.placement.as_coeffs())
+    };
+    let factor = match request.placement.scale {
+        Scale::Explicit { factor, .. } | Scale::Aligned { factor, .. } => factor,
+        Scale::Fit | Scale::Shrink => 1.0,
+    };
+    let center = Scale::Aligned { factor, align: Vec2::new(0.5, 0.5) };
+    if let Some([.., e, f]) = works(center) {
+        let sheet = machine.sheet();
+        return format!(
+            "--align center puts it on the sheet at this size (as --place {:.2},{:.2} does); --fit also scales it",
+            e - sheet.x0,
+            f - sheet.y0
+        );
+    }
+    if let Some([a, b, ..]) = works(Scale::Fit) {
+        return format!(
+            "--fit makes it fit, scaled by {:.4}; or choose --scale, --rotate and --place",
+            libm::hypot(a, b)
+        );
+    }
+    "neither --align center nor --fit makes it fit; --scale, --rotate, --mirror and --place change where it lies".to_owned()
 }

@@ -13,7 +13,7 @@ use picture::{Ink, Scene};
 
 use crate::cli::Emulate;
 use crate::failure::Failure;
-use crate::input::{self, LoadedMachine};
+use crate::machines::{self, LoadedMachine};
 use crate::pseudo_terminal::PseudoTerminal;
 use crate::{output, terminal};
 
@@ -24,7 +24,7 @@ pub(crate) fn run(arguments: &Emulate) -> Result<(), Failure> {
     if arguments.speedup.is_nan() || arguments.speedup <= 0.0 {
         return Err(Failure::Usage(anyhow::anyhow!("--speedup must be a positive number")));
     }
-    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let machine = arguments.machine.as_deref().map(machines::machine).transpose()?;
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))

@@ -10,6 +10,7 @@ use compiler::report::text::{self, duration, length, pluralize};
 use crate::cli::Info;
 use crate::failure::Failure;
 use crate::input::{self, Input};
+use crate::machines;
 use crate::output;
 
 /// Lengths are measured along the plan's own ink: any tolerance does.
@@ -26,7 +27,11 @@ pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
 }
 
 fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
-    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let machine = arguments
+        .machine
+        .as_deref()
+        .map(|name| machines::machine_with_paper(name, &arguments.reading))
+        .transpose()?;
     let drawn = input::drawing(input, &arguments.reading)?;
     let document = &drawn.document;
     let mut text = format!("drawing  {}\n", input.name);

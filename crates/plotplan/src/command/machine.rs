@@ -7,15 +7,16 @@ use drawing::{Line, Point, Segment};
 
 use crate::cli::Machine;
 use crate::failure::Failure;
-use crate::{input, output, terminal};
+use crate::machines;
+use crate::{output, terminal};
 
 pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
     let text = match arguments {
         Machine::List => list(),
         Machine::Show { name } => {
             // Only a machine that can be used is shown.
-            input::machine(name)?;
-            input::machine_toml(name)?
+            machines::machine(name)?;
+            machines::machine_toml(name)?
         }
         Machine::Check { file } => check(file)?,
     };
@@ -25,7 +26,7 @@ pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
 /// The presets, and the user's own machines.
 fn list() -> String {
     let mut text = String::new();
-    let own = input::own_machine_files();
+    let own = machines::own_machine_files();
     for preset in PRESETS.iter().filter(|preset| own.iter().all(|(name, _)| name != preset.name)) {
         let _ = writeln!(text, "{:<10} {}", preset.name, preset.about);
     }
@@ -36,7 +37,7 @@ fn list() -> String {
 }
 
 fn check(file: &str) -> Result<String, Failure> {
-    let machine = input::machine(file)?.machine;
+    let machine = machines::machine(file)?.machine;
     let sheet = machine.sheet();
     let mut text = format!("{} holds together\n", machine.name());
     let joints = machine.mechanism().joint_names();

@@ -8,6 +8,7 @@ use picture::Scene;
 use crate::cli::Preview;
 use crate::failure::Failure;
 use crate::input::{self, Input};
+use crate::machines;
 use crate::output;
 
 /// A picture's longer side, pixels.
@@ -38,7 +39,11 @@ pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
 }
 
 fn of_drawing(input: &Input, arguments: &Preview) -> Result<Scene, Failure> {
-    let machine = arguments.machine.as_deref().map(input::machine).transpose()?;
+    let machine = arguments
+        .machine
+        .as_deref()
+        .map(|name| machines::machine_with_paper(name, &arguments.reading))
+        .transpose()?;
     let drawn = input::drawing(input, &arguments.reading)?;
     let Some(machine) = machine else {
         return Ok(scene::of_drawing(&input.name, drawn.drawing()));
@@ -46,7 +51,7 @@ fn of_drawing(input: &Input, arguments: &Preview) -> Result<Scene, Failure> {
     let machine = &machine.machine;
     let mut drawing = drawn.drawing().clone();
     let request = super::request(&arguments.planning, drawn.page(), machine);
-    let map = planner::placement::place(machine, &drawing, &request.placement)
+    let map = planner::place(machine, &drawing, &request.placement)
         .map_err(|error| super::convert::explain(input, &drawing, machine, &request, error))?;
     drawing.transform(map);
     Ok(scene::of_placed(&format!("{} on {}", input.name, machine.name()), &drawing, machine))

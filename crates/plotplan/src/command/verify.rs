@@ -13,7 +13,8 @@ use serde_json::json;
 
 use crate::cli::{ReportForm, Verify};
 use crate::failure::Failure;
-use crate::input::{self, Input, LoadedMachine};
+use crate::input::{self, Input};
+use crate::machines::{self, LoadedMachine};
 use crate::{output, terminal};
 
 /// The tolerance of plans that state none.
@@ -78,7 +79,7 @@ pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, Lo
         .with_context(|| format!("{} is not a plan that can be used", input.name))
         .map_err(Failure::Drawing)?;
     let machine = match (machine, &plan.document) {
-        (Some(name), _) => input::machine(name)?,
+        (Some(name), _) => machines::machine(name)?,
         (None, Some(document)) => {
             let what = || "the machine in the plan document cannot be used";
             let file: MachineFile = serde_json::from_value(document.machine.clone())
@@ -87,7 +88,7 @@ pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, Lo
             let machine = file.machine().with_context(what).map_err(Failure::Drawing)?;
             LoadedMachine { file, machine }
         }
-        (None, None) => input::machine(&plan.table.header.machine)?,
+        (None, None) => machines::machine(&plan.table.header.machine)?,
     };
     Ok((plan, machine))
 }
