@@ -1,32 +1,33 @@
-//! The matrix between joints and motors.
+//! The coupling matrix between joints and motors.
 
 use nalgebra::{Matrix2, Vector2};
 
-/// `m = C q`: which combination of the joints each motor turns. Invertible by construction.
+/// `m = C q`: the combination of the joints that each motor drives. Always invertible.
 ///
-/// Examples: the identity for a plain machine; `[[1, 1], [1, -1]]` for CoreXY; for an arm whose elbow is driven through
-/// a belt of ratio `k` from a motor on the base, with absolute link angles as joints, `[[1, 0], [1 - 1/k, 1/k]]`, which
-/// is the identity for the usual `k = 1`: holding motor 2 keeps the second link's direction in the room, so the fold
-/// angle at the elbow follows the shoulder.
+/// Examples: the identity where each motor drives one joint; `[[1, 1], [1, -1]]` for CoreXY; for an arm
+/// whose elbow is driven through a belt of ratio `k` by a motor on the base, with absolute link angles
+/// as joints, `[[1, 0], [1 - 1/k, 1/k]]`. With the usual `k = 1` this is the identity: motor 2 sets the
+/// absolute direction of the second link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
     matrix: Matrix2<f64>,
     inverse: Matrix2<f64>,
 }
 
-/// The rows of the coupling matrix are parallel: some movement of the pen would turn no motor at all.
+/// The coupling matrix is singular: some motion of the pen would move no motor.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the coupling matrix has determinant {determinant}: it cannot be inverted")]
+#[error("the coupling matrix has determinant {determinant}: it is not invertible")]
 pub struct SingularCoupling {
-    /// The determinant of the matrix that was refused.
+    /// The determinant of the refused matrix.
     pub determinant: f64,
 }
 
 impl Coupling {
-    /// The coupling with the given rows, one a motor.
+    /// The coupling with the given rows, one per motor.
     ///
     /// # Errors
-    /// When the matrix is singular: its determinant is below 1e-9 of the product of its rows' lengths, or not a number.
+    /// When the matrix is singular: its determinant is at most 1e-9 of the product of its rows' lengths,
+    /// infinite or NaN.
     pub fn from_rows(rows: [[f64; 2]; 2]) -> Result<Self, SingularCoupling> {
         let matrix = Matrix2::new(rows[0][0], rows[0][1], rows[1][0], rows[1][1]);
         let determinant = matrix.determinant();

@@ -355,7 +355,7 @@ impl Machine {
         Self::new(MachineParts { sheet, ..self.parts.clone() })
     }
 
-    /// What it was made of.
+    /// The parts that it is made of.
     pub fn parts(&self) -> &MachineParts {
         &self.parts
     }
@@ -380,7 +380,7 @@ impl Machine {
         &self.parts.motors
     }
 
-    /// What its pen allows.
+    /// The limits of its pen.
     pub fn pen(&self) -> &PenLimits {
         &self.parts.pen
     }
@@ -395,46 +395,46 @@ impl Machine {
         self.parts.start
     }
 
-    /// Exact motor positions at a pose, in ticks that need not be whole.
+    /// Exact motor positions at a pose, ticks: not rounded.
     pub fn motor_positions(&self, q: &JointPos) -> MotorPos {
         self.motor_rates(q) + self.offset
     }
 
-    /// The pose at which the motors are where they are.
+    /// The pose at these motor positions.
     pub fn joint_positions(&self, motors: &MotorPos) -> JointPos {
         self.joint_rates(&(*motors - self.offset))
     }
 
-    /// Joint speeds (or accelerations) as motor speeds, ticks/s for rad/s and mm/s.
+    /// Joint velocities (or accelerations, ...) as those of the motors: ticks/s from rad/s and mm/s.
     pub fn motor_rates(&self, joint_rates: &JointPos) -> MotorPos {
         MotorPos(product(&self.to_ticks, joint_rates.0))
     }
 
-    /// Motor speeds as joint speeds.
+    /// Motor velocities (or accelerations, ...) as those of the joints.
     pub fn joint_rates(&self, motor_rates: &MotorPos) -> JointPos {
         JointPos(product(&self.from_ticks, motor_rates.0))
     }
 
-    /// Where the pen is when the motors are at `motors`, mm.
+    /// The position of the pen at these motor positions, mm.
     pub fn forward_from_motors(&self, motors: &MotorPos) -> Point {
         self.parts.mechanism.forward(&self.joint_positions(motors))
     }
 
-    /// The pose for the point `p`, unwrapped: of all whole turns about the base the one nearest to `near`. Joint limits
-    /// are not looked at.
+    /// The pose for the point `p`, unwrapped: of all full rotations about the base the one nearest to
+    /// `near`. Joint limits are not checked.
     ///
     /// # Errors
     /// When no pose reaches the point.
     pub fn pose_near(&self, p: Point, near: &JointPos) -> Result<JointPos, Unreachable> {
         let q = self.parts.mechanism.inverse(p)?;
         Ok(match self.parts.mechanism.full_rotation() {
-            // The first joint is one that turns.
             Some(rotation) => q + rotation * ((near[0] - q[0]) / rotation[0]).round(),
             None => q,
         })
     }
 
-    /// The poses for the point `p` that the joint limits allow, the one nearest to `near` first.
+    /// The poses for the point `p` within the joint limits, up to two full rotations either way from
+    /// the one nearest to `near`, which comes first.
     ///
     /// # Errors
     /// When there is none.
@@ -460,20 +460,21 @@ impl Machine {
         }
     }
 
-    /// First and second derivative of the motors' positions (ticks) along a path on which the pen, at pose `q`, has
-    /// the derivatives `first` and `second`.
+    /// First and second derivatives of the motor positions (ticks) along a path on which the pen, at
+    /// pose `q`, has the derivatives `first` and `second`.
     pub fn motor_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (MotorPos, MotorPos) {
         let (q_1, q_2) = self.parts.mechanism.path_derivatives(q, first, second);
         (self.motor_rates(&q_1), self.motor_rates(&q_2))
     }
 
-    /// Third derivative of the motors' positions (ticks) along such a path, on which the pen also has the derivative `third`.
+    /// Third derivative of the motor positions (ticks) along such a path, on which the pen also has the
+    /// derivative `third`.
     pub fn motor_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> MotorPos {
         self.motor_rates(&self.parts.mechanism.path_third_derivative(q, first, second, third))
     }
 
-    /// How far the pen can be from where it should be because motors only take whole ticks: the largest displacement
-    /// over half a tick more or less on both motors, mm.
+    /// The largest error of the pen's position from rounding motor positions to whole ticks, mm: over
+    /// half a tick either way on both motors.
     pub fn quantization_error(&self, q: &JointPos) -> f64 {
         let exact = self.parts.mechanism.forward(q);
         [(0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)]
@@ -485,13 +486,13 @@ impl Machine {
             .fold(0.0, f64::max)
     }
 
-    /// The joint of `q` that is outside its range, if one is. A rounding error of 1e-9 is forgiven.
+    /// The joint of `q` that is outside its range, if there is one. 1e-9 are allowed for rounding.
     pub fn joint_fault(&self, q: &JointPos) -> Option<Fault> {
         self.joint_fault_beyond(q, [1e-9, 1e-9])
     }
 
-    /// The same for points between those that [`Self::check_segment`] looked at: curves are checked as chords, so a joint
-    /// may exceed its range there by what a curve leaves its chord by, seen from no nearer than 10 mm.
+    /// The same for points between those that [`Self::check_segment`] checked. It takes curves as
+    /// chords, so a joint may exceed its range by the chord error, as an angle seen from 10 mm.
     pub fn joint_fault_between(&self, q: &JointPos) -> Option<Fault> {
         let slack = |kind| match kind {
             JointKind::Revolute => CHORD_TOLERANCE / 10.0,

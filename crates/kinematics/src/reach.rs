@@ -1,4 +1,4 @@
-//! Which points, and which whole segments, a machine can draw.
+//! Which points and which segments a machine can draw.
 
 use drawing::{Line, Point, Segment};
 
@@ -7,9 +7,9 @@ use crate::{JointKind, JointPos, JointRange, Machine, Unreachable};
 /// Why the pen cannot draw at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// Beyond the arm's length; by so many mm.
+    /// Beyond the reach by this many mm.
     TooFar(f64),
-    /// Nearer to the base than the arm folds; by so many mm.
+    /// Nearer to the base than the arm can fold, by this many mm.
     TooNear(f64),
     /// A joint would leave its range.
     JointLimit {
@@ -24,11 +24,12 @@ pub enum Fault {
         /// Largest allowed value.
         max: f64,
     },
-    /// Too near to a pose in which the pen cannot move in every direction: a stretched or folded arm, the pole.
+    /// Too close to a singular pose, in which the pen cannot move in every direction: a stretched or
+    /// folded arm, the pole of a polar machine.
     Singular {
-        /// How far from singular the pose is, see [`crate::Mechanism::manipulability`].
+        /// See [`crate::Mechanism::manipulability`].
         manipulability: f64,
-        /// The least the machine allows.
+        /// The smallest value that the machine allows.
         min: f64,
     },
 }
@@ -55,20 +56,17 @@ impl std::fmt::Display for Fault {
                     JointKind::Prismatic => (1.0, "mm"),
                 };
                 let (value, min, max) = (value * scale, min * scale, max * scale);
-                write!(
-                    f,
-                    "joint {joint} would be at {value:.2} {unit}, and may be from {min:.2} to {max:.2} {unit}"
-                )
+                write!(f, "joint {joint} would be {value:.2} {unit} (range {min:.2} to {max:.2} {unit})")
             }
             Self::Singular { manipulability, min } => write!(
                 f,
-                "the pose there is too nearly singular: an arm stretched or folded, a rail at its pole (dexterity {manipulability:.3}, at least {min:.3} is needed)"
+                "it is too close to a singularity (manipulability {manipulability:.3}, minimum {min:.3})"
             ),
         }
     }
 }
 
-/// A place that a machine cannot draw at.
+/// A point at which a machine cannot draw.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the point {:.2}, {:.2} mm cannot be drawn: {fault}", point.x, point.y)]
 pub struct OutOfReach {
@@ -78,17 +76,18 @@ pub struct OutOfReach {
     pub fault: Fault,
 }
 
-/// Curves are checked as chords that stay this close to them, mm; far below any machine's tick.
+/// Curves are checked as chords within this distance, mm: far below any machine's tick.
 pub(crate) const CHORD_TOLERANCE: f64 = 1e-3;
 
 impl Machine {
-    /// Whether the pen may draw at `p`: reachable, inside the joint limits, not too near to a singular pose.
+    /// Whether the pen may draw at `p`: reachable, within the joint limits, not too close to a
+    /// singular pose.
     ///
     /// # Errors
     /// When it may not.
     pub fn check_point(&self, p: Point) -> Result<(), OutOfReach> {
         let pose = self.pose_near(p, &self.start()).map_err(Fault::from);
-        // Whether the pose is nearly singular is the same after any number of turns; the joint limits are not.
+        // Full rotations change the joint positions, but not the manipulability.
         let fault = match pose {
             Err(fault) => Some(fault),
             Ok(q) => {

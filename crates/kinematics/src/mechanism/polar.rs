@@ -1,4 +1,4 @@
-//! A rail that turns about the base and a pen that slides along it.
+//! A rail that turns about the base, with a pen that slides along it.
 
 use drawing::{Point, Vec2};
 
@@ -15,7 +15,8 @@ use crate::JointPos;
 /// phi''' = (j.t - phi' a.e - 3 r' phi'' - 2 r'' phi') / r
 /// r''' = j.e + phi' a.t + r' phi'^2 + 2 r phi' phi''
 /// ```
-/// Singular at the centre. Source: differentiating the definition; seed 4 (drawing robot with rack and pinion).
+/// Singular at the pole. Source: differentiating the definition; the report of the polar machine
+/// (docs/references.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polar;
 
@@ -36,7 +37,7 @@ impl Mechanism for Polar {
         (q[1] * frame(q[0]).0).to_point()
     }
 
-    /// Every point has a pose; at the pole, which is singular, phi is 0.
+    /// Every point has a pose. At the pole, which is singular, phi is 0.
     fn inverse(&self, p: Point) -> Result<JointPos, Unreachable> {
         Ok(JointPos::new(libm::atan2(p.y, p.x), libm::hypot(p.x, p.y)))
     }
@@ -63,13 +64,13 @@ impl Mechanism for Polar {
         JointPos::new(phi_3, r_3)
     }
 
-    /// d²p/du² = 2 r' phi' t - r phi'^2 e, largest where r is.
+    /// d²p/du² = 2 r' phi' t - r phi'^2 e, largest at the largest r.
     fn second_derivative_bound(&self, from: &JointPos, to: &JointPos) -> f64 {
         let change = *to - *from;
         libm::hypot(2.0 * change[1] * change[0], from[1].abs().max(to[1].abs()) * change[0] * change[0])
     }
 
-    /// r counted in units of a page's centimetre: the angle is well held from 10 mm on.
+    /// r / 10 mm, at most 1: from 10 mm on, the angle is well determined.
     fn manipulability(&self, q: &JointPos) -> f64 {
         (q[1].abs() / 10.0).min(1.0)
     }

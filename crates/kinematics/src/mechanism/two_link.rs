@@ -26,9 +26,10 @@ use crate::{JointPos, MachineError};
 /// theta''' =  (j.e(psi)   + u cos beta + w) / (L1 sin beta) + theta'^3
 /// psi'''   = -(j.e(theta) + u + w cos beta) / (L2 sin beta) + psi'^3
 /// ```
-/// The elbow on the left of the line from base to pen means beta < 0. Singular when stretched or folded (beta = 0 or
-/// pi). Source: seed 1's report for the position; the derivatives by differentiating `p` and solving for the
-/// joints (the tests hold them against differences).
+/// The elbow on the left of the line from base to pen means beta < 0. Singular when stretched or
+/// folded (beta = 0 or pi). Source: the report of the coaxial arm (docs/references.md) for the position;
+/// the derivatives by differentiating `p` and solving for the joints (the tests compare them with finite
+/// differences).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoLink {
     /// Length of the first link, mm.
@@ -76,13 +77,14 @@ impl Mechanism for TwoLink {
         let factors = (farthest - r) * (farthest + r) * (r - nearest) * (r + nearest);
         let size = factors.max(0.0).sqrt() / (2.0 * l1 * l2);
         let sin = if elbow_left { -size } else { size };
-        // theta is the direction of p less that of (a, b), psi that from the elbow to p: two arcs, where the formula has three.
+        // theta is the direction of p minus that of (a, b), psi the direction from the elbow to p: two
+        // arctangents where the formula above has three.
         let (a, b) = (l1 + l2 * cos, l2 * sin);
         let first = Vec2::new(p.x * a + p.y * b, p.y * a - p.x * b);
         let elbow = l1 / first.hypot2().sqrt() * first;
         let theta = libm::atan2(first.y, first.x);
         let psi = libm::atan2(p.y - elbow.y, p.x - elbow.x);
-        // The fold is on the elbow's side.
+        // The sign of beta is that of the elbow's side.
         let turn = std::f64::consts::TAU;
         let psi = match (elbow_left, psi > theta) {
             (true, true) => psi - turn,
@@ -122,7 +124,7 @@ impl Mechanism for TwoLink {
         JointPos::new(theta_3, psi_3)
     }
 
-    /// d²p/du² = -L1 theta'^2 e(theta) - L2 psi'^2 e(psi), whatever the coupling.
+    /// d²p/du² = -L1 theta'^2 e(theta) - L2 psi'^2 e(psi).
     fn second_derivative_bound(&self, from: &JointPos, to: &JointPos) -> f64 {
         let change = *to - *from;
         self.l1_mm * change[0] * change[0] + self.l2_mm * change[1] * change[1]
