@@ -7,8 +7,7 @@
 use compiler::pipeline::{Order, Request, compile};
 use drawing::{Drawing, EllipticArc, Pen, Point, Span, Stroke, Vec2};
 use kinematics::{JointPos, Machine, TwoLink};
-use planner::TimingLaw;
-use planner::placement::{PlacementOptions, Scale};
+use planner::{PlacementOptions, Scale, TimingLaw};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 use test_support::{machines, polyline};
