@@ -40,7 +40,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         tolerance_mm: 0.1,
         period_us: 10_000,
         order: Order::File,
-        placement: PlacementOptions { rotate_rad: 0.0, scale },
+        placement: PlacementOptions { scale, ..PlacementOptions::default() },
         pen_speeds: Vec::new(),
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::default(),
