@@ -1,6 +1,79 @@
 //! Every kind of finding: its stable name, how much it matters, and what to say about it at length.
 
-use crate::diagnostics::{Code, Severity};
+use std::fmt;
+
+/// How much a finding matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// Worth knowing; the drawing is as the file says.
+    Note,
+    /// The file had to be interpreted: the drawing may differ from what was meant.
+    Warning,
+    /// Ink is lost: something that the file draws is not in the drawing.
+    Error,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        })
+    }
+}
+
+/// The stable name of a kind of finding, such as `H0101`.
+///
+/// A code never changes its meaning and is never given twice. [`Code::all`] lists them in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Code(u16);
+
+impl Code {
+    /// All codes, in the order of their numbers.
+    pub fn all() -> impl Iterator<Item = Self> {
+        CODES.iter().map(|entry| Self(entry.number))
+    }
+
+    /// The code of that name, in any case; nothing if there is none.
+    pub fn from_name(name: &str) -> Option<Self> {
+        CODES
+            .iter()
+            .find(|entry| entry.name.eq_ignore_ascii_case(name.trim()))
+            .map(|entry| Self(entry.number))
+    }
+
+    fn entry(self) -> &'static Entry {
+        // Codes are made from the table only, so the search succeeds; the first entry stands in for "not found".
+        CODES.iter().find(|entry| entry.number == self.0).unwrap_or(&CODES[0])
+    }
+
+    /// Its name, such as `H0101`.
+    pub fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// What it is about, in a few words.
+    pub fn title(self) -> &'static str {
+        self.entry().title
+    }
+
+    /// How much a finding of this kind matters.
+    pub fn severity(self) -> Severity {
+        self.entry().severity
+    }
+
+    /// What happened, what was done about it, and what can be done in the file; a paragraph.
+    pub fn explanation(self) -> &'static str {
+        self.entry().explanation
+    }
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 /// One row of the table.
 pub(crate) struct Entry {

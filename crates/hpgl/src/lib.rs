@@ -16,13 +16,12 @@
 
 mod codes;
 mod diagnostics;
+mod document;
 mod emit;
-mod encoded;
-mod envelope;
 mod fonts;
+mod grammar;
 mod interpreter;
-mod lexer;
-mod mnemonics;
+mod mnemonic;
 mod parser;
 mod producers;
 mod profile;
@@ -30,53 +29,20 @@ mod summary;
 mod syntax;
 mod units;
 
-use std::collections::BTreeMap;
-
-pub use diagnostics::{Code, Diagnostic, Severity};
+pub use codes::{Code, Severity};
+pub use diagnostics::Diagnostic;
+pub use document::{Document, Page, PenSettings};
 pub use drawing::{Drawing, Pen, Point, Span};
 pub use emit::{EmitOptions, Encoding, emit};
 pub use fonts::{CAP_HEIGHT as FONT_CAP_HEIGHT, Glyph};
+pub use grammar::name::known_commands;
 pub use interpreter::interpret;
-pub use mnemonics::all as known_commands;
+pub use mnemonic::Mnemonic;
 pub use producers::producer;
 pub use profile::{Options, Paper, Plotter, plotters};
 pub use summary::{Generation, Profile, ProfileReason, Summary, Wrappers};
-pub use syntax::{Command, Mnemonic, Syntax};
+pub use syntax::{Command, Syntax};
 pub use units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
-
-/// What a file draws, and what there is to say about it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Document {
-    /// The sheets in order; at least one, even where nothing is drawn.
-    pub pages: Vec<Page>,
-    /// What was found, one entry a kind, in the order of their first places.
-    pub diagnostics: Vec<Diagnostic>,
-    /// What the file consists of, and what it was read for.
-    pub summary: Summary,
-}
-
-/// One sheet.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Page {
-    /// Its ink; mm, y up, the origin where the file has it.
-    pub drawing: Drawing,
-    /// What the file says about each pen that draws on it.
-    pub pens: BTreeMap<Pen, PenSettings>,
-}
-
-/// What a file says about a pen. Where it says different things in the course of a page, the least speed, force and
-/// acceleration, and the last width.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PenSettings {
-    /// Speed with the pen down, mm/s (`VS`).
-    pub speed_mm_s: Option<f64>,
-    /// Force in the plotter's own steps (`FS`).
-    pub force: Option<f64>,
-    /// Acceleration in the plotter's own steps (`AS`).
-    pub acceleration: Option<f64>,
-    /// Width of the line, mm (`PW`).
-    pub width_mm: Option<f64>,
-}
 
 /// Takes a file apart without giving it a meaning; linear in its length.
 pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {

@@ -2,7 +2,7 @@
 
 use drawing::{Point, Rect};
 
-use crate::syntax::Mnemonic;
+use crate::mnemonic::Mnemonic;
 
 /// What a file consists of, and what it was read for.
 #[derive(Clone, Debug, Default, PartialEq)]

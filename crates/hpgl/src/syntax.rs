@@ -1,46 +1,10 @@
 //! What a file says, before any of it is given a meaning: commands with their parameters and bytes.
 
-use std::fmt;
-
 use drawing::Span;
 
 use crate::diagnostics::Findings;
-
-/// The two letters that name a command, in capitals.
-///
-/// Three names are not of the language: they stand for what the wrappers around it say ([`Mnemonic::RESET`] and so
-/// on), and print in angle brackets.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Mnemonic(pub [u8; 2]);
-
-impl Mnemonic {
-    /// A printer reset (`ESC E`) or the end of a job (`ESC %-12345X`): what was drawn so far is a page of its own.
-    pub const RESET: Self = Self([0, 1]);
-    /// A PCL picture frame (`ESC *c #x#Y`); parameters: width and height in plotter units.
-    pub const PICTURE_FRAME: Self = Self([0, 2]);
-    /// Entry into HP-GL/2 from PCL or RTL (`ESC %#B`); parameter: the number.
-    pub const ENTER: Self = Self([0, 3]);
-    /// No command at all: findings between commands are filed under it.
-    pub(crate) const NONE: Self = Self([0, 0]);
-}
-
-impl fmt::Display for Mnemonic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::RESET => f.write_str("<reset>"),
-            Self::PICTURE_FRAME => f.write_str("<picture frame>"),
-            Self::ENTER => f.write_str("<enter HP-GL/2>"),
-            Self::NONE => f.write_str("<none>"),
-            Self([a, b]) => write!(f, "{}{}", a.escape_ascii(), b.escape_ascii()),
-        }
-    }
-}
-
-impl fmt::Debug for Mnemonic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
+use crate::mnemonic::Mnemonic;
+use crate::summary::Wrappers;
 
 /// One command of a file, as the parser hands it to the interpreter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +24,15 @@ pub struct Command<'a> {
     pub text_span: Span,
     /// The file is Latin-1 that was saved as UTF-8.
     pub(crate) reencoded: bool,
+}
+
+/// What the parser noticed about the file as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Hints {
+    /// The file is UTF-8 made from Latin-1: bytes above 127 arrive as two.
+    pub(crate) reencoded: bool,
+    /// What stands around the commands.
+    pub(crate) wrappers: Wrappers,
 }
 
 /// A command in a [`Syntax`], its numbers kept in a list shared by all.
@@ -82,7 +55,7 @@ pub struct Syntax<'a> {
     pub(crate) entries: Vec<Entry>,
     pub(crate) parameters: Vec<f64>,
     pub(crate) findings: Findings,
-    pub(crate) hints: crate::parser::Hints,
+    pub(crate) hints: Hints,
     /// How many commands the file has, unknown ones included.
     pub(crate) command_count: usize,
 }

@@ -17,11 +17,14 @@ mod travel;
 use drawing::{Drawing, Pen, Point, Span};
 
 use crate::codes;
-use crate::diagnostics::{Code, Findings};
+use crate::codes::Code;
+use crate::diagnostics::Findings;
+use crate::document::{Document, Page};
 use crate::fonts::Glyph;
+use crate::mnemonic::Mnemonic;
 use crate::profile::Options;
-use crate::syntax::{Command, Mnemonic, Syntax};
-use crate::{Document, Page, Profile, Summary, Wrappers};
+use crate::summary::{Profile, Summary, Wrappers};
+use crate::syntax::{Command, Syntax};
 use characters::Characters;
 use fill::FillType;
 use frame::Frame;

@@ -4,7 +4,8 @@ use drawing::Drawing;
 
 use super::Interpreter;
 use crate::codes;
-use crate::{Page, ProfileReason};
+use crate::document::Page;
+use crate::summary::ProfileReason;
 
 impl Interpreter {
     /// Ends the sheet if anything is on it.

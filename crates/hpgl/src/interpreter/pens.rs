@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Holder, Interpreter};
-use crate::{PenSettings, codes};
+use crate::codes;
+use crate::document::PenSettings;
 use drawing::Pen;
 
 /// Settings for all pens, and for single ones.

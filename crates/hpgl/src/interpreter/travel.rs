@@ -4,7 +4,7 @@ use drawing::{Point, Vec2};
 
 use super::Interpreter;
 use crate::codes;
-use crate::encoded::{Decoder, Item};
+use crate::grammar::encoded::{Decoder, Item};
 
 impl Interpreter {
     pub(super) fn pen_up(&mut self, parameters: &[f64]) {

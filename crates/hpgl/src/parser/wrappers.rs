@@ -2,26 +2,40 @@
 
 use drawing::Span;
 
-use super::{Head, Language, Parser, Searched, Step};
+use super::state::{Head, Language, Parser, Searched, Step};
 use crate::codes;
-use crate::envelope::{self, DeviceControl, Escape};
-use crate::lexer::{Class, class};
-use crate::syntax::Mnemonic;
+use crate::grammar::bytes::{Class, class};
+use crate::grammar::escape::{Escape, escape, text};
+use crate::grammar::job::job_line;
+use crate::mnemonic::Mnemonic;
 
 /// Plotter units in a decipoint, the unit of picture frames: 1016 / 720.
 const PLU_PER_DECIPOINT: f64 = 1016.0 / 720.0;
 
 impl Parser<'_> {
+    /// A wrapper's command as one of our own.
+    fn wrapper(&mut self, mnemonic: Mnemonic, start: usize) -> Head {
+        self.number += 1;
+        self.textless(mnemonic, start)
+    }
+
     /// At ESC, in any language.
     pub(super) fn escape(&mut self) -> Option<Head> {
-        let start = self.at;
-        let (found, length) = envelope::escape(&self.bytes[start..]);
-        self.at = start + length;
-        let span = Span { start, end: self.at };
+        let start = self.at();
+        let found = self.take(escape)?;
+        let span = Span { start, end: self.at() };
         match found {
             Escape::DeviceControl(control) => {
                 self.hints.wrappers.device_control = true;
-                self.report_device_control(start, control);
+                if !control.terminated {
+                    self.report(codes::DEVICE_CONTROL_WITHOUT_COLON, Mnemonic::NONE, span, || {
+                        (
+                            "a device control sequence lacks its colon; it is ended where its parameters end"
+                                .into(),
+                            None,
+                        )
+                    });
+                }
                 None
             }
             Escape::EnterHpGl(parameter) => {
@@ -45,7 +59,7 @@ impl Parser<'_> {
                 Some(self.wrapper(Mnemonic::RESET, start))
             }
             Escape::Pcl(pcl) => {
-                if pcl.binary > 0 {
+                if pcl.binary {
                     self.report(codes::RASTER, Mnemonic::NONE, span, || {
                         ("raster or other binary data is skipped".into(), None)
                     });
@@ -58,7 +72,7 @@ impl Parser<'_> {
                 self.parameters.extend([plu(width), plu(height)]);
                 Some(self.wrapper(Mnemonic::PICTURE_FRAME, start))
             }
-            Escape::Other => {
+            Escape::Unknown => {
                 self.report(codes::STRAY_ESCAPE, Mnemonic::NONE, span, || {
                     ("an unknown escape sequence is skipped".into(), None)
                 });
@@ -67,38 +81,20 @@ impl Parser<'_> {
         }
     }
 
-    pub(super) fn restore_terminator(&mut self) {
-        self.terminator = self.default_terminator;
-        self.prints_terminator = false;
-    }
-
-    fn report_device_control(&mut self, start: usize, control: DeviceControl) {
-        if !control.terminated {
-            let span = Span { start, end: start + control.bytes };
-            self.report(codes::DEVICE_CONTROL_WITHOUT_COLON, Mnemonic::NONE, span, || {
-                (
-                    "a device control sequence lacks its colon; it is ended where its parameters end".into(),
-                    None,
-                )
-            });
-        }
-    }
-
     /// Whether HP-GL/2 is entered after this place by `ESC %#B` or by job control; if not, what looks like PCL cannot
     /// be meant as such.
     fn hpgl_is_entered_later(&mut self) -> bool {
+        let at = self.at();
         match self.next_entry {
             Searched::Nowhere => return false,
-            Searched::At(place) if place >= self.at => return true,
+            Searched::At(entry) if entry >= at => return true,
             _ => {}
         }
-        let found = (self.at..self.bytes.len()).find(|&at| {
+        let found = (at..self.bytes.len()).find(|&at| {
             let rest = &self.bytes[at..];
-            match rest[0] {
-                0x1b => {
-                    rest.get(1) == Some(&b'%') && matches!(envelope::escape(rest).0, Escape::EnterHpGl(_))
-                }
-                b'L' => rest.starts_with(b"LANGUAGE"),
+            match rest {
+                [0x1b, b'%', ..] => matches!(escape(rest), Ok((_, Escape::EnterHpGl(_)))),
+                [b'L', ..] => rest.starts_with(b"LANGUAGE"),
                 _ => false,
             }
         });
@@ -108,29 +104,20 @@ impl Parser<'_> {
 
     /// One step in PCL or RTL: everything up to the next ESC is text on the page, which no pen draws.
     pub(super) fn pcl(&mut self) -> Step {
-        let start = self.at;
-        let rest = &self.bytes[start..];
-        if rest.is_empty() {
-            return Step::End;
-        }
-        let length = rest.iter().position(|&b| b == 0x1b).unwrap_or(rest.len());
-        self.at = start + length;
-        if rest[..length].iter().any(u8::is_ascii_graphic) {
-            let span = Span { start, end: self.at };
-            self.report(codes::PCL_TEXT, Mnemonic::NONE, span, || {
+        let Some(text) = self.take(text) else { return Step::End };
+        if text.iter().any(u8::is_ascii_graphic) {
+            self.report(codes::PCL_TEXT, Mnemonic::NONE, self.span_of(text), || {
                 ("text outside HP-GL/2 (PCL) is not drawn".into(), None)
             });
         }
-        if self.at == self.bytes.len() { Step::End } else { self.escape().into() }
+        if self.rest.is_empty() { Step::End } else { self.escape().into() }
     }
 
     /// One step in job control: lines that begin with `@PJL`.
     pub(super) fn job(&mut self) -> Step {
-        let rest = &self.bytes[self.at..];
-        let Some(&byte) = rest.first() else { return Step::End };
-        if let Some((length, language)) = envelope::job_line(rest) {
+        let Some(&byte) = self.rest.first() else { return Step::End };
+        if let Some(language) = self.take(job_line) {
             self.hints.wrappers.job_control = true;
-            self.at += length;
             if let Some(language) = language {
                 let hpgl = language.to_ascii_uppercase().starts_with(b"HPGL");
                 self.language = if hpgl { Language::HpGl } else { Language::Pcl };
@@ -140,7 +127,7 @@ impl Parser<'_> {
         match class(byte) {
             Class::Escape => self.escape().into(),
             Class::Blank | Class::LineEnd | Class::Control => {
-                self.at += 1;
+                self.rest = &self.rest[1..];
                 Step::Nothing
             }
             // A plotter's own language needs no announcement.
