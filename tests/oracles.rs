@@ -1,5 +1,6 @@
-//! The presets against the equations of the four reports that they come from, written down here from the reports and not
-//! from our kinematics: positions, counts, start poses, and a listing's own points.
+//! The presets against the printed equations of the machine reports (docs/references.md), written
+//! here independently of our machine model: positions, counts, start poses, and the points of a
+//! listing.
 
 use compiler::machine_file::{MachineFile, PRESETS};
 use drawing::Point;
@@ -10,13 +11,13 @@ fn preset(name: &str) -> Machine {
     MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a preset is a machine")
 }
 
-/// Exact motor positions with the pen at (x, y) mm, in the whole turn of the start pose.
+/// Exact motor positions with the pen at (x, y) mm, in the same full rotation as the start pose.
 fn ticks(machine: &Machine, x: f64, y: f64) -> [f64; 2] {
     let pose = machine.pose_near(Point::new(x, y), &machine.start()).expect("within reach");
     machine.motor_positions(&pose).into()
 }
 
-/// Where the pen is with the motors at `ticks`, mm.
+/// The pen position with the motors at `ticks`, mm.
 fn pen(machine: &Machine, ticks: [f64; 2]) -> [f64; 2] {
     let point = machine.forward_from_motors(&MotorPos::from(ticks));
     [point.x, point.y]
@@ -26,8 +27,9 @@ fn near(a: [f64; 2], b: [f64; 2], within: f64) -> bool {
     (a[0] - b[0]).abs() <= within && (a[1] - b[1]).abs() <= within
 }
 
-/// Seed 1: the coaxial arm. th1 is the first arm's angle from +x, counterclockwise; th2 the fold of the second arm against
-/// the first one's direction, clockwise; the belt carries th1 into the second motor.
+/// Coaxial arm (report 1). th1 is the angle of the first arm from +x, counterclockwise; th2 is the
+/// fold of the second arm against the direction of the first one, clockwise; the belt couples th1
+/// into motor 2.
 mod coaxial {
     use super::*;
     use proptest::prelude::*;
@@ -42,17 +44,19 @@ mod coaxial {
         [th1.to_degrees(), th2.to_degrees()]
     }
 
-    /// Counts of both motors. The report subtracts the first arm's last move, `th1 - th1_previous`, from th2, and begins
-    /// with `th1_previous` = 90; what the belt needs is the whole way from there, which is the same for a first point.
+    /// Counts of both motors. The report subtracts the last move of the first arm,
+    /// `th1 - th1_previous`, from th2, and starts with `th1_previous` = 90. The belt needs the sum
+    /// of all moves, which is the same for a first point.
     fn counts([th1, th2]: [f64; 2]) -> [f64; 2] {
         [CPR / 360.0 * th1, CPR / 360.0 * (th2 - (th1 - 90.0))]
     }
 
-    /// The report's sample of a converted drawing begins with `PU 1183x327` for the drawing's (0, 0), which it puts on the
-    /// sheet's upper left corner: x0 right of the base, y0 above it. Of the values it gives, y0 = 14 in (its usage line)
-    /// makes these counts; y0 = 14.5 in (Appendix D) makes 1156x308, whatever it says of the arms' lengths.
+    /// The report's sample of a converted drawing starts with `PU 1183x327` for (0, 0) of the
+    /// drawing, at the upper left corner of the sheet: x0 right of the base, y0 above it. Of the
+    /// values in the report, y0 = 14 in (its usage line) gives these counts; y0 = 14.5 in (Appendix
+    /// D) gives 1156x308, for any of the stated arm lengths.
     #[test]
-    fn the_first_point_of_the_reports_sample() {
+    fn first_point_of_the_reports_sample() {
         let whole = |arms, y0| counts(angles(arms, 0.5, y0)).map(f64::round);
         for l1 in [8.11, 8.1102] {
             for l2 in [10.078, 10.0787, 10.08] {
@@ -63,7 +67,7 @@ mod coaxial {
     }
 
     #[test]
-    fn the_presets_sheet_has_its_upper_left_corner_there() {
+    fn preset_sheet_corner_matches_the_sample() {
         let machine = preset("coaxial");
         let sheet = machine.sheet();
         assert!(near([sheet.x0, sheet.y1], [0.5 * 25.4, 14.0 * 25.4], 1e-9), "{sheet:?}");
@@ -72,7 +76,7 @@ mod coaxial {
     }
 
     #[test]
-    fn it_starts_straight_up() {
+    fn start_pose_is_straight_up() {
         let machine = preset("coaxial");
         let start: [f64; 2] = machine.motor_positions(&machine.start()).into();
         assert!(near(start, counts([90.0, 0.0]), 1e-9), "{start:?}");
@@ -82,20 +86,20 @@ mod coaxial {
 
     proptest! {
         #[test]
-        fn every_point_of_the_sheet_has_the_reports_counts(x in 12.7..228.6, y in 76.2..355.6) {
+        fn sheet_points_match_the_reports_counts(x in 12.7..228.6, y in 76.2..355.6) {
             let machine = preset("coaxial");
             let [th1, th2] = angles([206.0, 256.0], x, y);
             let theirs = counts([th1, th2]);
             let ours = ticks(&machine, x, y);
             prop_assert!(near(ours, theirs, 1e-6), "{ours:?}, the report has {theirs:?}");
             prop_assert!(near(pen(&machine, theirs), [x, y], 1e-9));
-            // Adding the arc cosine puts the elbow on the left of the line from base to pen.
+            // The elbow is on the left of the line from base to pen.
             let (sin, cos) = libm::sincos(th1.to_radians());
             prop_assert!(x * sin - y * cos > 0.0);
         }
 
         #[test]
-        fn any_two_angles_put_the_pen_where_the_report_says(th1 in -90.0..270.0, th2 in 0.0..180.0) {
+        fn angles_match_the_reports_pen_position(th1 in -90.0..270.0, th2 in 0.0..180.0) {
             let (sin1, cos1) = libm::sincos(f64::to_radians(th1));
             let (sin12, cos12) = libm::sincos(f64::to_radians(th1 - th2));
             let theirs = [206.0 * cos1 + 256.0 * cos12, 206.0 * sin1 + 256.0 * sin12];
@@ -103,9 +107,10 @@ mod coaxial {
             prop_assert!(near(ours, theirs, 1e-9), "{ours:?}, the report has {theirs:?}");
         }
 
-        /// theta2_{n+1} = theta2_n + theta1_{n+1} - theta1_n: what the fold does while the second motor stands still.
+        /// theta2_{n+1} = theta2_n + theta1_{n+1} - theta1_n: the fold while the second motor is at
+        /// rest.
         #[test]
-        fn the_fold_follows_the_first_arm(first in 0.0..1600.0, second in 0.0..1600.0, by in -800.0..800.0_f64) {
+        fn fold_follows_the_first_arm(first in 0.0..1600.0, second in 0.0..1600.0, by in -800.0..800.0_f64) {
             let machine = preset("coaxial");
             let joints = |arm1: f64| machine.joint_positions(&MotorPos::from([arm1, second]));
             let (before, after) = (joints(first), joints(first + by));
@@ -117,12 +122,12 @@ mod coaxial {
     }
 }
 
-/// Seed 2: the coupled plotter, its equations (1) to (4), over its whole bed of 250 x 250 mm.
+/// H-bot plotter (report 2), equations (1) to (4), over the bed of 250 x 250 mm.
 mod hbot {
     use super::*;
 
     #[test]
-    fn equations_3_and_4_and_back_by_1_and_2() {
+    fn equations_1_to_4_round_trip() {
         let machine = preset("hbot");
         let bed = machine.sheet();
         assert_eq!([bed.x0, bed.y0, bed.x1, bed.y1], [0.0, 0.0, 250.0, 250.0]);
@@ -138,7 +143,7 @@ mod hbot {
     }
 
     #[test]
-    fn the_bed_takes_the_whole_range_of_the_counters() {
+    fn bed_corners_use_the_full_counter_range() {
         let machine = preset("hbot");
         let corners = [(0.0, 0.0), (250.0, 0.0), (250.0, 250.0), (0.0, 250.0)];
         let counts = corners.map(|(x, y)| ticks(&machine, x, y).map(f64::round));
@@ -147,14 +152,14 @@ mod hbot {
     }
 }
 
-/// Seed 3: the planar worktable with the motors A and B.
+/// CoreXY worktable (report 3) with the motors A and B.
 mod corexy {
     use super::*;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
-        fn displacements_times_the_encoder_ratio(x in 0.0..200.0, y in 0.0..200.0) {
+        fn counts_are_displacement_times_encoder_ratio(x in 0.0..200.0, y in 0.0..200.0) {
             let enc_ratio = 171.79 * 24.0 / (14.26 * std::f64::consts::PI);
             let machine = preset("corexy");
             let (a, b) = (x + y, x - y);
@@ -166,25 +171,26 @@ mod corexy {
     }
 
     #[test]
-    fn the_datum_is_zero() {
+    fn datum_is_zero() {
         let machine = preset("corexy");
         assert_eq!(machine.motor_positions(&machine.start()).0, [0.0, 0.0]);
         assert_eq!(pen(&machine, [0.0, 0.0]), [0.0, 0.0]);
     }
 }
 
-/// Seed 4: the drawing robot with a turning rail and a rack.
+/// Polar robot (report 4) with a turning rail and a rack.
 mod polar {
     use super::*;
     use assert_cmd::cargo::cargo_bin;
     use proptest::prelude::*;
 
-    /// What `Servo.write(theta)` sends, microseconds, and where `set_r` turns the other servo, degrees from its start.
+    /// The pulse of `Servo.write(theta)`, us, and the angle of the other servo after `set_r`,
+    /// degrees from its start.
     fn commands(r: f64, theta: f64) -> [f64; 2] {
         [544.0 + theta * (2400.0 - 544.0) / 180.0, (r - 138.0) * 360.0 / 44.0]
     }
 
-    /// The point whose r and theta the listing computes as hypot(x, y) and degrees(atan(x / y)) + 90.
+    /// The inverse of the listing's r = hypot(x, y) and theta = degrees(atan(x / y)) + 90.
     fn point(r: f64, theta: f64) -> Point {
         let (sin, cos) = libm::sincos((theta - 90.0).to_radians());
         Point::new(r * sin, r * cos)
@@ -192,7 +198,7 @@ mod polar {
 
     proptest! {
         #[test]
-        fn every_point_of_the_half_ring_has_the_listings_commands(r in 48.0..138.0, theta in 0.1..179.9) {
+        fn half_ring_points_match_the_listings_commands(r in 48.0..138.0, theta in 0.1..179.9) {
             let Point { x, y } = point(r, theta);
             let listing = commands(libm::hypot(x, y), libm::atan(x / y).to_degrees() + 90.0);
             let machine = preset("polar");
@@ -203,21 +209,21 @@ mod polar {
     }
 
     #[test]
-    fn the_listings_word_is_drawn_through_every_one_of_its_points() {
+    fn plan_passes_all_points_of_the_listing() {
         let machine = preset("polar");
         let sheet = machine.sheet();
         let mut vertices = Vec::new();
         for (r, theta) in RADII.into_iter().zip(ANGLES) {
             let Point { x, y } = point(r, theta);
             assert!(near(ticks(&machine, x, y), commands(r, theta), 1e-9), "r {r}, theta {theta}");
-            // Plotter units of 0.025 mm; the drawing's origin lies on the sheet's corner.
+            // Plotter units of 0.025 mm; the origin of the drawing is at the corner of the sheet.
             vertices.push(format!("{:.0},{:.0}", (x - sheet.x0) * 40.0, (y - sheet.y0) * 40.0));
         }
         let hpgl = format!("IN;SP1;PU{};PD{},{};PU;", vertices[0], vertices[1..].join(","), vertices[0]);
         let mut program = assert_cmd::Command::new(cargo_bin!("plotplan"));
         program.args(["convert", "-", "--machine", "polar", "--format", "csv"]).write_stdin(hpgl);
-        let said = program.assert().success();
-        let csv = std::str::from_utf8(&said.get_output().stdout).expect("text");
+        let output = program.assert().success();
+        let csv = std::str::from_utf8(&output.get_output().stdout).expect("text");
         let rows: Vec<[i64; 4]> = csv
             .lines()
             .skip_while(|line| !line.starts_with("t_us,"))
@@ -225,7 +231,7 @@ mod polar {
             .map(|line| line.split(',').map(|field| field.parse().expect("a whole number")))
             .map(|fields| fields.collect::<Vec<_>>().try_into().expect("four columns"))
             .collect();
-        // The servos' commands back to the pen, by the listing; 20 points on the way from row to row.
+        // From servo commands to the pen with the listing's equations, 20 points between two rows.
         let ink: Vec<Point> = rows
             .windows(2)
             .filter(|pair| pair[0][1] == 1)
@@ -238,8 +244,8 @@ mod polar {
                 point(138.0 + degrees * 44.0 / 360.0, (us - 544.0) * 180.0 / 1856.0)
             })
             .collect();
-        // Half a microsecond at the largest radius, half a degree of the pinion and half a plotter unit each way, on top
-        // of the tolerance.
+        // The tolerance, half a us at the largest radius, half a degree of the pinion, half a
+        // plotter unit.
         let half_tick =
             [RADII.into_iter().fold(0.0, f64::max) * (90.0 / 1856.0_f64).to_radians(), 22.0 / 360.0];
         let allowed = 0.1 + libm::hypot(half_tick[0], half_tick[1]) + libm::hypot(0.0125, 0.0125);
@@ -250,7 +256,7 @@ mod polar {
         }
     }
 
-    /// Both arrays as the listing has them: mm and degrees.
+    /// Both arrays of the listing, mm and degrees.
     const RADII: [f64; 129] = [
         87.95, 83.96, 80.49, 76.64, 72.96, 69.64, 67.49, 67.3, 69.54, 73.41, 77.41, 81.18, 84.53, 87.21,
         89.49, 91.99, 95.17, 98.98, 103.07, 107.0, 110.9, 114.51, 117.84, 120.85, 123.56, 125.83, 127.67,

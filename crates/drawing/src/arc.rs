@@ -2,8 +2,6 @@
 
 use kurbo::{Affine, Point, Vec2};
 
-use crate::segment::apply_linear;
-
 /// An arc of an ellipse: `p(u) = center + cos(u) a + sin(u) b`, with `u` from `start_rad` to
 /// `start_rad + sweep_rad`.
 ///
@@ -109,4 +107,27 @@ impl EllipticArc {
         let count = (self.sweep_rad.abs() / largest).ceil();
         if count.is_finite() && count >= 1.0 { count as usize } else { 1 }
     }
+
+    /// The angles `base + k * every` in the parameter range.
+    pub(crate) fn angles_within(&self, base: f64, every: f64) -> Vec<f64> {
+        let (low, high) = if self.sweep_rad < 0.0 {
+            (self.start_rad + self.sweep_rad, self.start_rad)
+        } else {
+            (self.start_rad, self.start_rad + self.sweep_rad)
+        };
+        let first = ((low - base) / every).ceil();
+        let last = ((high - base) / every).floor();
+        if last < first || (last - first).is_nan() {
+            return Vec::new();
+        }
+        // Two full ellipses are enough: further angles repeat the same points.
+        let count = (last - first).min(2.0 * std::f64::consts::TAU / every) as usize + 1;
+        (0..count).map(|k| base + (first + k as f64) * every).collect()
+    }
+}
+
+/// The linear part of an affine map applied to a vector.
+fn apply_linear(map: Affine, v: Vec2) -> Vec2 {
+    let [a, b, c, d, _, _] = map.as_coeffs();
+    Vec2::new(a * v.x + c * v.y, b * v.x + d * v.y)
 }

@@ -2,7 +2,7 @@
 
 use kurbo::{Point, Rect};
 
-use crate::{Segment, segment::angles_within};
+use crate::Segment;
 
 /// The parts of `segment` inside `window`, in order, as ranges of the parameter.
 ///
@@ -70,7 +70,7 @@ fn crossings(segment: &Segment, axis: usize, edge: f64, cuts: &mut Vec<f64>) {
             if cosine.abs() <= 1.0 && arc.sweep_rad != 0.0 {
                 let (phi, half) = (libm::atan2(b, a), libm::acos(cosine));
                 for base in [phi - half, phi + half] {
-                    for u in angles_within(arc, base, std::f64::consts::TAU) {
+                    for u in arc.angles_within(base, std::f64::consts::TAU) {
                         add((u - arc.start_rad) / arc.sweep_rad);
                     }
                 }

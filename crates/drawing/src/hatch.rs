@@ -52,8 +52,8 @@ pub struct HatchGrid {
 
 impl HatchGrid {
     /// The parts of the lines inside closed outlines, line by line, the parts of every odd line in
-    /// reverse order, so that a pen goes back and forth (it still has to draw odd lines from `to` to
-    /// `from`).
+    /// reverse order, so that a pen goes back and forth (it still has to draw odd lines from `to`
+    /// to `from`).
     ///
     /// `outlines` are the pieces of all outlines; the pieces of each must form a closed path.
     /// Curves are flattened to 0.005 mm. Every crossing of a line takes one from `pieces_left`;

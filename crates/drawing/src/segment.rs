@@ -15,12 +15,6 @@ pub enum Segment {
     Cubic(CubicBez),
 }
 
-/// The linear part of an affine map applied to a vector.
-pub(crate) fn apply_linear(map: Affine, v: Vec2) -> Vec2 {
-    let [a, b, c, d, _, _] = map.as_coeffs();
-    Vec2::new(a * v.x + c * v.y, b * v.x + d * v.y)
-}
-
 impl Segment {
     /// First point, mm.
     pub fn start(&self) -> Point {
@@ -119,7 +113,7 @@ impl Segment {
                 // x is extreme where tan u = b.x / a.x, and y likewise: two angles in 2 pi.
                 for (a, b) in [(arc.a.x, arc.b.x), (arc.a.y, arc.b.y)] {
                     let extreme = libm::atan2(b, a);
-                    for u in angles_within(arc, extreme, std::f64::consts::PI) {
+                    for u in arc.angles_within(extreme, std::f64::consts::PI) {
                         bounds = bounds.union_pt(arc.at_angle(u));
                     }
                 }
@@ -148,8 +142,8 @@ impl Segment {
         }
     }
 
-    /// Calls `to` with the end of each chord of a flattening within `tolerance_mm`. The start of the
-    /// segment is not passed.
+    /// Calls `to` with the end of each chord of a flattening within `tolerance_mm`. The start of
+    /// the segment is not passed.
     pub fn flatten(&self, tolerance_mm: f64, mut to: impl FnMut(Point)) {
         let count = self.chord_count(tolerance_mm);
         for step in 1..count {
@@ -157,23 +151,6 @@ impl Segment {
         }
         to(self.end());
     }
-}
-
-/// The angles `base + k * every` in the parameter range of the arc.
-pub(crate) fn angles_within(arc: &EllipticArc, base: f64, every: f64) -> Vec<f64> {
-    let (low, high) = if arc.sweep_rad < 0.0 {
-        (arc.start_rad + arc.sweep_rad, arc.start_rad)
-    } else {
-        (arc.start_rad, arc.start_rad + arc.sweep_rad)
-    };
-    let first = ((low - base) / every).ceil();
-    let last = ((high - base) / every).floor();
-    if last < first || (last - first).is_nan() {
-        return Vec::new();
-    }
-    // Two full ellipses are enough: further angles repeat the same points.
-    let count = (last - first).min(2.0 * std::f64::consts::TAU / every) as usize + 1;
-    (0..count).map(|k| base + (first + k as f64) * every).collect()
 }
 
 /// The length of an elliptic arc, to about 1e-7 mm a quarter turn: adaptive Simpson quadrature of

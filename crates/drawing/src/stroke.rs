@@ -82,8 +82,9 @@ impl Stroke {
         self.path.curve_to(Curve::Arc(arc), arc.eval(1.0));
     }
 
-    /// Appends an arc whose last point equals `end` up to rounding; `end` is the new end, exactly. A whole circle that
-    /// ends at its start is closed only this way, because sin 2π is not 0 in floating point.
+    /// Appends an arc whose last point equals `end` up to rounding; `end` is the new end, exactly.
+    /// A whole circle that ends at its start is closed only this way, because sin 2π is not 0 in
+    /// floating point.
     pub fn arc_to(&mut self, arc: EllipticArc, end: Point) {
         self.path.curve_to(Curve::Arc(arc), end);
     }

@@ -29,8 +29,10 @@
 //! assert!((report.travel_cost_after - 0.2).abs() < 1e-12);
 //! ```
 
+mod cost;
 mod dedupe;
 mod merge;
+mod options;
 mod report;
 mod seam;
 mod search;
@@ -38,75 +40,12 @@ mod touch;
 
 use drawing::{Drawing, Pen, Point, Stroke};
 
+pub use cost::{Cost, CostPoint};
 /// The distance in the plane, mm: the [`Cost`] without a machine.
 pub use drawing::distance;
+pub use options::Options;
 pub use report::Report;
 use search::{End, Problem};
-
-/// A point in the space in which costs are computed: joint positions, or the plane itself.
-pub type CostPoint = [f64; 2];
-
-/// The cost of a pen-up move between two points in mm: in seconds on a machine, or in mm.
-///
-/// It must be symmetric, finite, not negative, and a pure function of its arguments. Any function
-/// or closure of two points is a cost. The search evaluates the same points many times: a cost that
-/// needs inverse kinematics does it once a point, in `to_cost_space`.
-pub trait Cost {
-    /// Maps a point of the plane to the space in which costs are computed.
-    fn to_cost_space(&self, point: Point) -> CostPoint;
-
-    /// The cost of a move between two mapped points.
-    fn between_cost_points(&self, a: CostPoint, b: CostPoint) -> f64;
-
-    /// The cost of a move between two points of the plane.
-    fn between(&self, a: Point, b: Point) -> f64 {
-        self.between_cost_points(self.to_cost_space(a), self.to_cost_space(b))
-    }
-}
-
-impl<F: Fn(Point, Point) -> f64 + Sync> Cost for F {
-    fn to_cost_space(&self, point: Point) -> CostPoint {
-        [point.x, point.y]
-    }
-
-    fn between_cost_points(&self, a: CostPoint, b: CostPoint) -> f64 {
-        self(Point::from((a[0], a[1])), Point::from((b[0], b[1])))
-    }
-}
-
-/// Options of [`optimize`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// 0: local optimum from several starts. 1, 2 (default), 3: perturbation search after that,
-    /// each eight times as long as the one before.
-    pub effort: u8,
-    /// Removes strokes all of whose segments are drawn by other strokes of the same pen.
-    pub dedupe: bool,
-    /// Joins strokes whose ends touch (within 1e-6 mm) into the fewest possible strokes.
-    pub merge: bool,
-    /// Never reverses a stroke.
-    pub keep_direction: bool,
-    /// Pen position before the first stroke. If `None`, the first stroke costs nothing to reach.
-    pub start: Option<Point>,
-    /// Pen position after the last stroke. If `None`, there is no move after it.
-    pub park: Option<Point>,
-    /// Pen order. Pens that are not listed follow in the order of their first stroke.
-    pub pen_order: Option<Vec<Pen>>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            effort: 2,
-            dedupe: false,
-            merge: true,
-            keep_direction: false,
-            start: None,
-            park: None,
-            pen_order: None,
-        }
-    }
-}
 
 /// Reorders the strokes of a drawing to reduce pen-up travel, and reports the effect.
 ///

@@ -261,7 +261,7 @@ pub(crate) struct Verify {
     /// The drawing it should draw; without it only motion is verified
     #[arg(short, long, value_name = "FILE")]
     pub(crate) drawing: Option<String>,
-    /// The machine, where the plan only knows its name and it is no preset
+    /// Machine whose limits apply [default: of the plan document, else the preset the plan names]
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
     /// Largest distance between drawing and pen that the plan was made for; a plan document knows its own

@@ -60,17 +60,17 @@ impl Deviation {
 /// Statistics of a distance along a length. Both figures are upper bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeviationStats {
-    /// Largest distance, mm. Never understated. Overstated by at most 1/100 of the tolerance for the
-    /// ink, and by at most 1/8 for the drawing (1/500 where straight parts of the ink are longer than
-    /// that).
+    /// Largest distance, mm. Never understated. Overstated by at most 1/100 of the tolerance for
+    /// the ink, and by at most 1/8 for the drawing (1/500 where straight parts of the ink are
+    /// longer than that).
     pub max_mm: f64,
     /// 99 % of the length has at most this distance, mm; overstated by at most 1/64 of itself. Dots
     /// have no length and count for the maximum only.
     pub p99_mm: f64,
     /// Whether `max_mm` is only a lower bound, because no ink came near a part of the drawing.
     pub is_lower_bound: bool,
-    /// Amount by which the distance between two sampled points may exceed `max_mm`, mm. 0 except for
-    /// drawings that are too long to be sampled densely.
+    /// Amount by which the distance between two sampled points may exceed `max_mm`, mm. 0 except
+    /// for drawings that are too long to be sampled densely.
     pub sampling_error_mm: f64,
 }
 
@@ -88,8 +88,8 @@ pub struct QuantizationError {
 /// The peaks of one motor, in finite differences of the table's whole ticks.
 ///
 /// With steps of one period `T` the bounds are `|first difference| <= v T + 1 tick` and
-/// `|second difference| <= a T² + 2 ticks`, because each tick is off by half a tick at most. A share
-/// is the difference divided by its bound: a good plan reaches at most 1.
+/// `|second difference| <= a T² + 2 ticks`, because each tick is off by half a tick at most. A
+/// share is the difference divided by its bound: a good plan reaches at most 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorPeak {
     /// Name of the motor.
@@ -126,7 +126,7 @@ pub struct JerkPeak {
     pub limit_ticks_s3: f64,
     /// Largest share of the bound.
     pub share: f64,
-    /// 99.9th percentile of the share, over the rows at which the motor moves; overstated by at most
-    /// 1/64 of itself.
+    /// 99.9th percentile of the share, over the rows at which the motor moves; overstated by at
+    /// most 1/64 of itself.
     pub share_p999: f64,
 }

@@ -1,9 +1,9 @@
 //! How well the ink covers the drawing.
 //!
-//! Each straight piece of the drawing is divided into short cells. The distance to one run is convex
-//! along a cell, so the cell is covered to within the larger value at its ends; the smallest bound
-//! over all runs is kept. A cell beside the common point `v` of two consecutive runs is divided at
-//! `m`, the point nearest to `v`: each run covers one part.
+//! Each straight piece of the drawing is divided into short cells. The distance to one run is
+//! convex along a cell, so the cell is covered to within the larger value at its ends; the smallest
+//! bound over all runs is kept. A cell beside the common point `v` of two consecutive runs is
+//! divided at `m`, the point nearest to `v`: each run covers one part.
 
 use crate::{
     DeviationStats, Location,
@@ -210,8 +210,8 @@ impl Cover {
 
 /// A distance as it is stored: never rounded down; infinite beyond the radius.
 ///
-/// Rounding square and error to `f32`, the root, the sum and the product cost half a unit in the last
-/// place (`EPSILON / 2`) each; `4 EPSILON` covers all of them.
+/// Rounding square and error to `f32`, the root, the sum and the product cost half a unit in the
+/// last place (`EPSILON / 2`) each; `4 EPSILON` covers all of them.
 fn bound(square: f32, error: f32, radius: f32) -> f32 {
     let mm = (square.sqrt() + error) * (1.0 + 4.0 * f32::EPSILON);
     if mm <= radius { mm } else { f32::INFINITY }

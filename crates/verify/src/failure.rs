@@ -223,7 +223,8 @@ fn stage(rounded: bool) -> &'static str {
 }
 
 impl Violation {
-    /// Whether it concerns a motor limit (speed, acceleration, jerk), which a caller may allow to exceed.
+    /// Whether it concerns a motor limit (speed, acceleration, jerk), which a caller may allow to
+    /// exceed.
     pub fn is_limit(&self) -> bool {
         matches!(
             self,
@@ -295,8 +296,8 @@ pub(crate) struct Failures {
 }
 
 impl Failures {
-    /// Adds a failure. Failures of the same kind and `which` (a motor or pen) are counted, and the one
-    /// with the largest `severity` is kept; of equal ones, the first.
+    /// Adds a failure. Failures of the same kind and `which` (a motor or pen) are counted, and the
+    /// one with the largest `severity` is kept; of equal ones, the first.
     pub(crate) fn note(&mut self, violation: Violation, which: usize, severity: f64, location: Location) {
         let kind = std::mem::discriminant(&violation);
         let known = self

@@ -1,9 +1,10 @@
 //! Following: a fast path for drawings with hundreds of strokes near each run.
 //!
-//! Where strokes are that close, examining all of them for every run takes too long. Then only those
-//! stretches of strokes are examined that have stayed near since the pen came here. Every distance
-//! found this way is still an upper bound. What may be lost is that ink covers a stroke in passing;
-//! so a table that fails while following is measured again in full, see [`crate::certify`].
+//! Where strokes are that close, examining all of them for every run takes too long. Then only
+//! those stretches of strokes are examined that have stayed near since the pen came here. Every
+//! distance found this way is still an upper bound. What may be lost is that ink covers a stroke in
+//! passing; so a table that fails while following is measured again in full, see
+//! [`crate::certify`].
 
 use std::collections::VecDeque;
 use std::ops::Range;

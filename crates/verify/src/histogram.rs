@@ -25,7 +25,8 @@ impl Histogram {
         self.weights[bin as usize] += weight;
     }
 
-    /// An upper bound for at least `share` of the weight: the upper edge of a bin, at most `largest`.
+    /// An upper bound for at least `share` of the weight: the upper edge of a bin, at most
+    /// `largest`.
     pub(crate) fn percentile(&self, share: f64, largest: f64) -> f64 {
         let total: f64 = self.weights.iter().sum();
         let mut sum = 0.0;

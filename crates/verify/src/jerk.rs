@@ -4,8 +4,8 @@ use crate::{JerkPeak, histogram::Histogram, limits::Excess};
 
 /// Checks one motor row by row.
 ///
-/// For four rows at the times `t0` to `t3` the third divided difference of the position is a sixth of
-/// the jerk at some time between them. Each tick is off by half a tick at most, so with
+/// For four rows at the times `t0` to `t3` the third divided difference of the position is a sixth
+/// of the jerk at some time between them. Each tick is off by half a tick at most, so with
 /// `w_i = Π 1 / |t_i - t_j|` over the other three rows
 ///
 /// ```text
@@ -37,7 +37,8 @@ impl JerkCheck {
         let dt_s = dt_us as f64 * 1e-6;
         let (difference, from) = (difference as f64, self.rows[2].1);
         let mut worst = None;
-        // Of the omitted rows, only the first and last two can enter a third difference that is not 0.
+        // Of the omitted rows, only the first and last two can enter a third difference that is not
+        // 0.
         let omitted = (dt_us as f64 / (self.period_s * 1e6)).round().max(1.0) as u64;
         let near = [1, 2, omitted.saturating_sub(2), omitted.saturating_sub(1)];
         let mut last = 0;
@@ -73,14 +74,14 @@ impl JerkCheck {
         if rows.iter().all(|row| row.1 == rows[0].1) {
             return worst;
         }
-        let (mut divided, mut room) = (0.0, 0.0);
+        let (mut divided, mut allowance) = (0.0, 0.0);
         for (i, (t, q)) in rows.iter().enumerate() {
             let others = rows.iter().enumerate().filter(|(j, _)| *j != i);
             let weight = 1.0 / others.map(|(_, other)| t - other.0).product::<f64>();
             divided += weight * q;
-            room += weight.abs();
+            allowance += weight.abs();
         }
-        let (value, allowed) = (6.0 * f64::abs(divided), self.limit + 3.0 * room);
+        let (value, allowed) = (6.0 * f64::abs(divided), self.limit + 3.0 * allowance);
         let share = value / allowed;
         self.jerk = self.jerk.max(value);
         self.share = self.share.max(share);
@@ -114,7 +115,8 @@ mod tests {
 
     const PERIOD_US: u64 = 10_000;
 
-    /// 10^7 ticks/s³: at 10 ms 10 + 4 ticks a third difference. The index of the first step in excess.
+    /// 10^7 ticks/s³: at 10 ms 10 + 4 ticks a third difference. The index of the first step in
+    /// excess.
     fn first_excess(steps: &[(u64, i64)]) -> Option<usize> {
         let mut check = JerkCheck::new(1e7, PERIOD_US);
         for (index, (periods, step)) in steps.iter().enumerate() {
@@ -127,7 +129,8 @@ mod tests {
 
     #[test]
     fn third_difference_limit_is_14_ticks() {
-        // Steps of 14, 42, 70, ... have second differences of 14, 28, 28, ... and third ones of 14, 14, 0.
+        // Steps of 14, 42, 70, ... have second differences of 14, 28, 28, ... and third ones of 14,
+        // 14, 0.
         assert_eq!(
             first_excess(&[(1, 14), (1, 42), (1, 70), (1, 84), (1, 84), (1, 70), (1, 42), (1, 14)]),
             None

@@ -7,8 +7,8 @@
 //! drawing, not on the duration of the plan.
 //!
 //! ```text
-//! Row --limits--> first, second, third differences of ticks against the limits of the motors
-//!  \--forward kinematics--> pen path --trace--> distance from ink to drawing, and from drawing to ink
+//! Row --limits--> first, second, third differences of ticks against the motors' limits
+//!  \--forward kinematics--> pen path --trace--> distance ink to drawing and drawing to ink
 //! ```
 //!
 //! All limits are those of the machine. The header of a plan provides the time between rows only;
@@ -43,7 +43,10 @@
 //! let drawing = Drawing { strokes: vec![stroke] };
 //! let ticks = [0, 0, 0, 50, 100, 50, 0, 0, 0];
 //! let mut rows: Vec<Row> = (0..9)
-//!     .map(|k| Row { t_us: 100_000 * k, pen: u16::from((1..7).contains(&k)), ticks: [ticks[k as usize], 0] })
+//!     .map(|k| {
+//!         let pen = u16::from((1..7).contains(&k));
+//!         Row { t_us: 100_000 * k, pen, ticks: [ticks[k as usize], 0] }
+//!     })
 //!     .collect();
 //! let timing = Timing { period_us: 100_000, lift_overlap_us: 0 };
 //! let verify = |rows: &[Row]| {

@@ -1,4 +1,5 @@
-//! One motor's column against its speed and acceleration limits, in finite differences of whole ticks.
+//! One motor's column against its speed and acceleration limits, in finite differences of whole
+//! ticks.
 
 use kinematics::Motor;
 
@@ -22,18 +23,18 @@ impl Excess {
 /// Checks one motor row by row.
 ///
 /// Let the motor follow `q(t)` with `|q'| <= v` and `|q''| <= a`, and let the table hold `q` at the
-/// rows to half a tick. Over a step `h` the mean speed `V = (q1 - q0) / h` satisfies `|V| <= v`, and
-/// the two roundings change it by `(1/2 + 1/2) / h` at most:
+/// rows to half a tick. Over a step `h` the mean speed `V = (q1 - q0) / h` satisfies `|V| <= v`,
+/// and the two roundings change it by `(1/2 + 1/2) / h` at most:
 ///
 /// ```text
-/// |V| <= v + 1/h                                 (1)  times h = T:  |first difference| <= v T + 1
+/// |V| <= v + 1/h                              (1)  times h = T: |first difference| <= v T + 1
 /// ```
 ///
-/// Over two neighbouring steps `h1`, `h2` the divided difference is `V2 - V1 = q''(t) (h1 + h2) / 2`
-/// for some `t` between them; the tick in the middle enters twice:
+/// Over two neighbouring steps `h1`, `h2` the divided difference is
+/// `V2 - V1 = q''(t) (h1 + h2) / 2` for some `t` between them; the tick in the middle enters twice:
 ///
 /// ```text
-/// |V2 - V1| <= a (h1 + h2) / 2 + 1/h1 + 1/h2     (2)  times h = T:  |second difference| <= a T² + 2
+/// |V2 - V1| <= a (h1 + h2) / 2 + 1/h1 + 1/h2  (2)  times h = T: |second difference| <= a T² + 2
 /// ```
 ///
 /// A step longer than the period replaces omitted rows, between which the motor moves uniformly or
@@ -73,8 +74,8 @@ impl MotorCheck {
         }
     }
 
-    /// The motor moves by `difference` ticks in `dt_us`. Returns the excess of (1) in this step, and
-    /// of (2) at its beginning.
+    /// The motor moves by `difference` ticks in `dt_us`. Returns the excess of (1) in this step,
+    /// and of (2) at its beginning.
     pub(crate) fn step(&mut self, dt_us: u64, difference: i64) -> (Option<Excess>, Option<Excess>) {
         let dt_s = dt_us as f64 * 1e-6;
         let velocity = difference as f64 / dt_s;
@@ -157,7 +158,8 @@ mod tests {
         MotorCheck::new(with_limits(1e4, 1e5), PERIOD_US)
     }
 
-    /// Steps of one period each, then rest: whether (1) is exceeded, and the first step that exceeds (2).
+    /// Steps of one period each, then rest: whether (1) is exceeded, and the first step that
+    /// exceeds (2).
     fn run(steps: &[i64]) -> (bool, Option<usize>) {
         let mut motor = motor();
         let mut fast = false;

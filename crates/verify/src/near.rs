@@ -1,7 +1,7 @@
 //! Bounds of the distance from a run to the drawing.
 //!
-//! The distance from a point to one straight piece is convex along a run, so over the whole run it is
-//! at most its larger value at the ends. Where different pieces are nearest to the two ends (at
+//! The distance from a point to one straight piece is convex along a run, so over the whole run it
+//! is at most its larger value at the ends. Where different pieces are nearest to the two ends (at
 //! corners of the drawing) the run is halved until the bound is tight. Nothing is sampled.
 
 use std::ops::Range;
@@ -10,8 +10,8 @@ use drawing::{Point, distance};
 
 use crate::target::PenTarget;
 
-/// A bound is tight enough if it exceeds the value at the ends by this share of the tolerance, or by
-/// this share of itself.
+/// A bound is tight enough if it exceeds the value at the ends by this share of the tolerance, or
+/// by this share of itself.
 const TIGHT: (f64, f64) = (1.0 / 200.0, 1.0 / 16.0);
 /// The same share of the tolerance where the bound would be the new maximum.
 const TIGHTEST: f64 = 1.0 / 5000.0;
@@ -33,8 +33,8 @@ impl Near<'_> {
     /// Passes bounds of the distance between two points of the run to `to`: a bound at either end
     /// (between them the distance is below the linear interpolation) and the length they hold for.
     ///
-    /// `ends` are the two points with their distances, `common` the distances of both points from one
-    /// piece, `among` the candidates.
+    /// `ends` are the two points with their distances, `common` the distances of both points from
+    /// one piece, `among` the candidates.
     pub(crate) fn bound(
         &mut self,
         among: Range<usize>,

@@ -19,8 +19,8 @@ pub(crate) struct Run {
     pub(crate) at: At,
 }
 
-/// Chords being merged: every line from `anchor` in a direction between `right` and `left` passes all
-/// points of the chain within the merging distance.
+/// Chords being merged: every line from `anchor` in a direction between `right` and `left` passes
+/// all points of the chain within the merging distance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chain {
     anchor: Point,
@@ -40,8 +40,8 @@ impl Chain {
         Self { anchor, last: anchor, chords: 0, cone: None, error: 0.0, at, before, moved }
     }
 
-    /// Adds the chord from `last` to `point` if one line from the anchor then still passes all points
-    /// within `merge`; returns whether it did. A first chord is always added.
+    /// Adds the chord from `last` to `point` if one line from the anchor then still passes all
+    /// points within `merge`; returns whether it did. A first chord is always added.
     ///
     /// Each point narrows the cone of possible directions (Williams 1978, Sklansky and Gonzalez
     /// 1980). The points move away from the anchor monotonically, so none is beyond the line's end.
@@ -92,7 +92,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Merged points are within the merging distance of the run, and points of the run of the path.
+        /// Merged points are within the merging distance of the run, and points of the run of the
+        /// path.
         #[test]
         fn merged_points_are_within_the_merging_distance(
             steps in prop::collection::vec((-0.1..1.0, -0.15..0.15), 1..60),

@@ -1,4 +1,5 @@
-//! The drawing as the verifier uses it: straight pieces by pen, divided into cells, in a bounding box tree.
+//! The drawing as the verifier uses it: straight pieces by pen, divided into cells, in a bounding
+//! box tree.
 
 use drawing::{Drawing, Point, Rect, Segment, Span, Vec2};
 
@@ -64,8 +65,8 @@ impl Piece {
         self.start + along * self.along
     }
 
-    /// Upper bound of the distance from a point in the piece's frame to the stroke; overstated by at most
-    /// `2 error`.
+    /// Upper bound of the distance from a point in the piece's frame to the stroke; overstated by
+    /// at most `2 error`.
     pub(crate) fn distance(&self, (along, across): (f64, f64)) -> f64 {
         let beyond = along - along.clamp(0.0, self.length);
         (beyond * beyond + across * across).sqrt() + self.error
@@ -77,8 +78,8 @@ impl Piece {
         [self.distance(self.local(points[0])), self.distance(self.local(points[1]))]
     }
 
-    /// Whether a line may come within `radius` of the stroke. It does not if both its ends are beyond the
-    /// radius on the same side of the piece, before its start or after its end.
+    /// Whether a line may come within `radius` of the stroke. It does not if both its ends are
+    /// beyond the radius on the same side of the piece, before its start or after its end.
     #[inline]
     pub(crate) fn may_be_near(&self, from: Point, to: Point, radius: f64) -> bool {
         let ((x0, y0), (x1, y1)) = (self.local(from), self.local(to));
@@ -113,8 +114,8 @@ pub(crate) struct PenTarget {
     pub(crate) pieces: Vec<Piece>,
     /// Their indices by location, see [`by_position`].
     order: Vec<u32>,
-    /// `levels[0][i]` bounds the pieces `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the boxes of
-    /// `levels[k]` likewise; the last level is one box.
+    /// `levels[0][i]` bounds the pieces `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the
+    /// boxes of `levels[k]` likewise; the last level is one box.
     levels: Vec<Vec<Rect>>,
 }
 
@@ -187,8 +188,8 @@ impl PenTarget {
     }
 }
 
-/// The indices of the pieces along a Morton (Z-order) curve through their midpoints, so that neighbours
-/// share boxes.
+/// The indices of the pieces along a Morton (Z-order) curve through their midpoints, so that
+/// neighbours share boxes.
 fn by_position(pieces: &[Piece]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
     let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return order };

@@ -1,7 +1,7 @@
 //! One path of the pen, measured against the drawing in both directions as a stream.
 //!
-//! The path arrives as short chords. Chords on one line are merged to runs ([`crate::run`]). Each run
-//! is measured: from the ink to the drawing ([`crate::near`]), and from the drawing to the ink
+//! The path arrives as short chords. Chords on one line are merged to runs ([`crate::run`]). Each
+//! run is measured: from the ink to the drawing ([`crate::near`]), and from the drawing to the ink
 //! ([`crate::cover`]). In crowded drawings only followed strokes are examined ([`crate::follow`]).
 
 use drawing::{Point, Rect, distance};
@@ -87,8 +87,8 @@ impl Trace {
         trace
     }
 
-    /// Ink may deviate by the tolerance plus `quantization`: the radius is a quarter more than that.
-    /// Where strokes are close, the work grows with its square.
+    /// Ink may deviate by the tolerance plus `quantization`: the radius is a quarter more than
+    /// that. Where strokes are close, the work grows with its square.
     pub(crate) fn widen(&mut self, quantization: f64) {
         let radius = 1.25 * (self.tolerance + quantization);
         if radius > self.radius {
@@ -268,8 +268,8 @@ impl Trace {
         self.candidates.extend(meeting.map(|(index, _)| (0.0, *index)));
     }
 
-    /// Ensures that `near` holds every piece that meets `bounds`. A wider list is kept while the pen
-    /// stays near.
+    /// Ensures that `near` holds every piece that meets `bounds`. A wider list is kept while the
+    /// pen stays near.
     fn gather(&mut self, target: &Target, bounds: Rect) {
         let holds = |known: Rect| {
             known.x0 <= bounds.x0 && bounds.x1 <= known.x1 && known.y0 <= bounds.y0 && bounds.y1 <= known.y1

@@ -96,9 +96,9 @@ pub type ExactRow = (Row, Option<[f64; MOTORS]>);
 
 /// Certifies a whole table whose rows can be generated twice.
 ///
-/// The first measurement is fast and may fail a good plan where many strokes are close; if it fails,
-/// the table is measured again in full. Arguments are those of [`Verifier::new`]; `rows` starts from
-/// the beginning at each call.
+/// The first measurement is fast and may fail a good plan where many strokes are close; if it
+/// fails, the table is measured again in full. Arguments are those of [`Verifier::new`]; `rows`
+/// starts from the beginning at each call.
 pub fn certify<I: Iterator<Item = ExactRow>>(
     machine: &Machine,
     drawing: &Drawing,
@@ -119,8 +119,8 @@ pub fn certify<I: Iterator<Item = ExactRow>>(
 impl<'a> Verifier<'a> {
     /// A verifier for one plan of `drawing` (as placed, machine mm) on `machine`.
     ///
-    /// The limits of motors, joints and pen are those of `machine`. `timing` is taken from the plan,
-    /// and checked against its rows. `tolerance_mm` is the deviation that the plan may have.
+    /// The limits of motors, joints and pen are those of `machine`. `timing` is taken from the
+    /// plan, and checked against its rows. `tolerance_mm` is the deviation that the plan may have.
     pub fn new(
         machine: &'a Machine,
         drawing: &Drawing,
@@ -482,9 +482,9 @@ impl<'a> Verifier<'a> {
 
 /// Follows the pen while both motors move linearly from one pose to the other.
 ///
-/// The joints then move linearly too. Over the whole step the second derivative of the path is at most
-/// `B = second_derivative_bound(from, to)`; over one of `n` equal parts it is `B / n²`, so the chord
-/// error of that part is at most `B / (8 n²)`.
+/// The joints then move linearly too. Over the whole step the second derivative of the path is at
+/// most `B = second_derivative_bound(from, to)`; over one of `n` equal parts it is `B / n²`, so the
+/// chord error of that part is at most `B / (8 n²)`.
 fn draw(trace: &mut Trace, target: &Target, machine: &Machine, from: &Pose, to: &Pose, at: At) {
     let geometry = machine.mechanism();
     let chord_error = geometry.second_derivative_bound(&from.joints, &to.joints) / 8.0;

@@ -145,7 +145,7 @@ fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
     };
     let _ = writeln!(
         text,
-        "  {what}: ink strays by at most {}, drawing missed by at most {}",
+        "  {what}: max deviation ink to drawing {}, drawing to ink {}",
         stats(&deviation.ink_to_drawing),
         stats(&deviation.drawing_to_ink)
     );

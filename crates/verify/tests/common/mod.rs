@@ -56,7 +56,8 @@ pub fn cartesian() -> Machine {
     Machine::new(parts).expect("a sound machine")
 }
 
-/// The coaxial arm (report 1): both motors on the base, 3200 ticks a turn, stretched up at the start.
+/// The coaxial arm (report 1): both motors on the base, 3200 ticks a turn, stretched up at the
+/// start.
 pub fn arm() -> Machine {
     let counts = 3200.0 / std::f64::consts::TAU;
     let up = std::f64::consts::FRAC_PI_2;
