@@ -625,13 +625,13 @@ fn bundled_drawings(on: usize) {
     }
 }
 
-/// Polylines of 2000 vertices in total, in plotter units, within 190 x 190 mm: random steps of up
-/// to `reach`, a new polyline of the other pen after every `vertices`.
-fn scribble(seed: u64, reach: i32, vertices: usize) -> String {
+/// Polylines of `count` vertices in total, in plotter units, within 190 x 190 mm: random steps of up to
+/// `reach`, a new polyline of the other pen after every `vertices`.
+fn scribble(seed: u64, reach: i32, vertices: usize, count: usize) -> String {
     let mut random = Random(seed);
     let mut hpgl = "IN;".to_owned();
     let mut at = [4000, 4000];
-    for vertex in 0..2000 {
+    for vertex in 0..count {
         if vertex % vertices == 0 {
             hpgl.extend([format!(";PU;SP{};PU{},{};PD", 1 + (vertex / vertices) % 2, at[0], at[1])]);
         } else {
@@ -645,8 +645,9 @@ fn scribble(seed: u64, reach: i32, vertices: usize) -> String {
 
 fn random_drawings(machine: &Machine) {
     let folder = TempDir::new().expect("a folder");
+    let count = if machine.file.is_none() { 2000 } else { 500 };
     for (seed, reach, vertices) in [(1, 200, 2000), (2, 60, 400), (3, 8, 2000), (4, 400, 10)] {
-        let hpgl = scribble(seed, reach, vertices);
+        let hpgl = scribble(seed, reach, vertices, count);
         let file = folder.path().join(format!("scribble{seed}.hpgl"));
         fs::write(&file, &hpgl).expect("a file can be written");
         let drawing = strokes(&hpgl);
