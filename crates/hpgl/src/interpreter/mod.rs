@@ -171,6 +171,7 @@ impl Interpreter {
     }
 
     /// Does what a command says.
+    #[expect(clippy::too_many_lines, reason = "one match arm per command")]
     pub(crate) fn execute(&mut self, command: &Command<'_>) {
         let mnemonic = command.mnemonic;
         let goes_on = self.number == command.number;
