@@ -1,6 +1,7 @@
 //! How fast files are read: `cargo run --release -p plotplan-hpgl --example throughput -- FILE...`
 //!
-//! Prints megabytes of input a second, the best of five runs each, for parsing alone and for reading to strokes.
+//! Prints megabytes of input a second, the best of five runs each, for parsing alone and for
+//! reading to strokes.
 #![expect(clippy::disallowed_methods, reason = "a measurement needs the clock and its arguments")]
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "the result of a measurement is printed")]
 

@@ -1,15 +1,15 @@
-//! Every kind of finding: its stable name, how much it matters, and what to say about it at length.
+//! The diagnostic codes: name, severity, title and explanation.
 
 use std::fmt;
 
-/// How much a finding matters.
+/// The severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
-    /// Worth knowing; the drawing is as the file says.
+    /// Information; the drawing is what the file defines.
     Note,
     /// The file had to be interpreted: the drawing may differ from what was meant.
     Warning,
-    /// Ink is lost: something that the file draws is not in the drawing.
+    /// Ink is missing: something that the file draws is not in the drawing.
     Error,
 }
 
@@ -35,7 +35,7 @@ impl Code {
         CODES.iter().map(|entry| Self(entry.number))
     }
 
-    /// The code of that name, in any case; nothing if there is none.
+    /// The code of that name, in any case; `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         CODES
             .iter()
@@ -44,7 +44,8 @@ impl Code {
     }
 
     fn entry(self) -> &'static Entry {
-        // Codes are made from the table only, so the search succeeds; the first entry stands in for "not found".
+        // Codes are made from the table only, so the search succeeds; the first entry stands in for
+        // "not found".
         CODES.iter().find(|entry| entry.number == self.0).unwrap_or(&CODES[0])
     }
 
@@ -105,9 +106,9 @@ codes! {
     STRAY_BYTE = 102 "H0102" Note "stray character"
         "A character that has no meaning where it stands, such as `!` or `#` between commands or among numbers. It is \
          skipped. Many of them mean that the file is not HPGL, or that it was damaged on its way."
-    CONTROL_BYTE = 103 "H0103" Note "control byte passed over"
+    CONTROL_BYTE = 103 "H0103" Note "control byte skipped"
         "NUL, ETX, form feed or another control byte, DEL, or a byte above 127 outside labels: padding of serial \
-         lines, byte order marks and the like. Plotters pass over them and so does this reader."
+         lines, byte order marks and the like. Plotters skip them and so does this reader."
     NUMBERS_WITHOUT_COMMAND = 104 "H0104" Warning "numbers without command"
         "Numbers after a semicolon, or at the start of the file, belong to no command and are skipped. If they are \
          coordinates, the semicolon before them should be a comma."
@@ -118,12 +119,12 @@ codes! {
         "The two letters of a name stand apart (`P A0,0`). They are read as one name, as HP's interpreters do."
     EMPTY_PARAMETER = 107 "H0107" Warning "empty parameter"
         "Two separators with nothing between them, or one before the first number. The language has no empty \
-         parameters: the gap is passed over, and the numbers after it move up."
+         parameters: the gap is skipped, and the numbers after it move up."
     NUMBER_OUT_OF_RANGE = 108 "H0108" Error "number out of range"
         "A number of 2^30 or more in size. In a coordinate list the pair that it belongs to is left out, any other \
          command with such a number has no effect."
     LINE_END_IN_NUMBER = 109 "H0109" Warning "line end between digits"
-        "Only a line end stands between two digits. Plotters pass over line ends, so that `40`, line end, `0` is 400, \
+        "Only a line end stands between two digits. Plotters skip line ends, so that `40`, line end, `0` is 400, \
          and files wrapped at a fixed width need that. Files written by hand mean two numbers. In a coordinate list \
          the reading is chosen that gives whole pairs; if both do, line ends part numbers only where all of them \
          stand between pairs."
@@ -150,7 +151,7 @@ codes! {
         "A raster picture, a font or other binary data, skipped by its own count of bytes. Pens cannot draw it."
     ENCODED_WITHOUT_TERMINATOR = 117 "H0117" Warning "encoded polyline without terminator"
         "The data of PE end at a semicolon. Here another byte comes first that cannot be data; the polyline is ended \
-         after its last whole number, and reading goes on from there."
+         after its last whole number, and reading continues there."
     ENCODED_DAMAGED = 118 "H0118" Error "damaged encoded polyline"
         "The data of PE hold an unfinished number, half a pair, or a number of fractional bits beyond 26. What is \
          whole is drawn, the rest is left out. A file that went through a 7-bit line or a text editor looks like \
@@ -170,7 +171,7 @@ codes! {
         "A command that draws has too few parameters, or some that it does not allow. It is skipped, and its ink is \
          missing."
     ODD_COORDINATES = 206 "H0206" Warning "odd number of coordinates"
-        "A coordinate list has an x without its y at the end. That x is passed over."
+        "A coordinate list has an x without its y at the end. That x is skipped."
     COORDINATE_OUT_OF_RANGE = 207 "H0207" Error "coordinate beyond all paper"
         "After scaling, a point lies more than 25 km from the origin, or is no number at all. It is left out. The \
          scaling points (IP, IR) and the scale (SC) before it are the place to look."
@@ -179,7 +180,7 @@ codes! {
     SCALING_POINTS_MEET = 209 "H0209" Note "scaling points coincide"
         "IP or IR puts P1 and P2 on one line. P2 is moved by one plotter unit, as HP-GL/2 does."
     CLIPPED = 210 "H0210" Note "clipped at the window"
-        "Ink outside the window that IW sets is not drawn, as the file says."
+        "Ink outside the window that IW sets is not drawn."
     EMPTY_WINDOW = 211 "H0211" Warning "window without extent"
         "IW sets a window that is empty or lies outside the page. Nothing is drawn until another one is set."
     OUTPUT_COMMAND = 212 "H0212" Note "command that asks the plotter"
@@ -204,7 +205,7 @@ codes! {
         "EP or FP asks for a polygon, but the polygon buffer holds none."
     UNKNOWN_CHARACTER = 220 "H0220" Error "character not drawn"
         "A character of a label or a symbol is not in the built-in stroke font, or its byte stands for none in the character \
-         set. Its place stays empty. The font has the Latin alphabets, Greek letters and the signs of the sets that \
+         set. Its cell stays empty. The font has the Latin alphabets, Greek letters and the signs of the sets that \
          plotters knew; other scripts should be converted to outlines or strokes before."
     FILL_REPLACED = 221 "H0221" Warning "raster fill replaced by a hatch"
         "FT11 and FT22 fill areas with a raster of dots that only printers have. A pen draws lines: a hatch that covers \
@@ -222,9 +223,9 @@ codes! {
         "Ink outside the page that PS sets is not drawn, as on a plotter of HP-GL/2. The page begins at the origin and its \
          longer side lies along x. If the ink should be drawn, the lengths of PS are too small."
     ASSUMED_PLOTTER = 226 "H0226" Note "scaling points assumed"
-        "SC maps user units to the scaling points P1 and P2, and the file does not say where they are. Those of the plotter \
+        "SC maps user units to the scaling points P1 and P2, and the file does not set them. Those of the plotter \
          named in the options are taken, else of a 7475A with A4 paper, or the corners of the page in HP-GL/2. The size of the \
-         drawing hangs on it; its shape does as far as the proportions differ."
+         drawing depends on it; so does its shape where the proportions differ."
     TOO_MANY_CHORDS = 227 "H0227" Note "arc of needless chords or turns"
         "An arc asks for chords so short that no plotter could draw them, or goes round more than once. It is drawn smooth; \
          turns that draw nothing new are drawn once, and the pen ends where the angle says."
@@ -238,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_and_names_agree_and_rise() {
+    fn code_numbers_and_names_agree() {
         for pair in CODES.windows(2) {
             assert!(pair[0].number < pair[1].number, "{}", pair[1].name);
         }

@@ -1,4 +1,4 @@
-//! What a reader of a file is told: one [`Diagnostic`] a kind of finding, with its first place and a count.
+//! Diagnostics: one per kind of finding, with its first occurrence and a count.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,24 +8,24 @@ use drawing::{Point, Span};
 use crate::codes::{Code, Severity};
 use crate::mnemonic::Mnemonic;
 
-/// One kind of finding about one command, with its first place.
+/// One kind of finding about one command, with its first occurrence.
 ///
-/// Findings of the same code about the same mnemonic are one diagnostic: `count` says how often.
+/// Findings of the same code about the same mnemonic are one diagnostic with a `count`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
     /// What kind of finding.
     pub code: Code,
-    /// How much it matters.
+    /// Its severity.
     pub severity: Severity,
-    /// The bytes of the first place.
+    /// The bytes of the first occurrence.
     pub span: Span,
-    /// Number of the command at the first place, counted from 1 over all commands of the file.
+    /// Number of the command at the first occurrence, counted from 1 over all commands of the file.
     pub command: usize,
-    /// Where the pen stood at the first place, mm.
+    /// The pen position at the first occurrence, mm.
     pub pen_position: Point,
     /// What was found there.
     pub message: String,
-    /// What could be done about it.
+    /// What can be done about it.
     pub help: Option<String>,
     /// How often it was found.
     pub count: u64,
@@ -49,7 +49,7 @@ pub(crate) struct Findings {
 }
 
 impl Findings {
-    /// Counts a finding; `message` is asked for at its first place only.
+    /// Counts a finding; `message` is called at the first occurrence only.
     pub(crate) fn report(
         &mut self,
         code: Code,
@@ -81,8 +81,8 @@ impl Findings {
         self.found.len()
     }
 
-    /// Tells the findings from `index` on where the pen stood when they were met.
-    pub(crate) fn place(&mut self, index: usize, pen_position: Point) {
+    /// Sets the pen position of the findings from `index` on.
+    pub(crate) fn set_pen_position(&mut self, index: usize, pen_position: Point) {
         for diagnostic in &mut self.found[index..] {
             diagnostic.pen_position = pen_position;
         }
@@ -93,7 +93,7 @@ impl Findings {
         self.found.iter().any(|diagnostic| diagnostic.code == code)
     }
 
-    /// Makes all findings of one code a single one of another, at their first place.
+    /// Makes all findings of one code a single one of another, at their first occurrence.
     pub(crate) fn recode(&mut self, from: Code, to: Code, message: impl FnOnce() -> String) {
         let Some(first) = self.found.iter().position(|diagnostic| diagnostic.code == from) else { return };
         let count = self.found.iter().filter(|diagnostic| diagnostic.code == from).map(|d| d.count).sum();

@@ -1,4 +1,4 @@
-//! What reading a file comes to.
+//! The result of reading a file.
 
 use std::collections::BTreeMap;
 
@@ -7,28 +7,28 @@ use drawing::{Drawing, Pen};
 use crate::diagnostics::Diagnostic;
 use crate::summary::Summary;
 
-/// What a file draws, and what there is to say about it.
+/// A file that was read: its pages, diagnostics and a summary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Document {
     /// The sheets in order; at least one, even where nothing is drawn.
     pub pages: Vec<Page>,
-    /// What was found, one entry a kind, in the order of their first places.
+    /// One entry per kind of finding, ordered by first occurrence.
     pub diagnostics: Vec<Diagnostic>,
-    /// What the file consists of, and what it was read for.
+    /// Command counts, wrappers and the plotter profile.
     pub summary: Summary,
 }
 
 /// One sheet.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Page {
-    /// Its ink; mm, y up, the origin where the file has it.
+    /// Its strokes; mm, y up, in the file's own origin.
     pub drawing: Drawing,
-    /// What the file says about each pen that draws on it.
+    /// Settings of each pen that draws on it.
     pub pens: BTreeMap<Pen, PenSettings>,
 }
 
-/// What a file says about a pen. Where it says different things in the course of a page, the least speed, force and
-/// acceleration, and the last width.
+/// Settings of a pen on one page. Where they change in the course of a page: the least speed, force
+/// and acceleration, and the last width.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PenSettings {
     /// Speed with the pen down, mm/s (`VS`).

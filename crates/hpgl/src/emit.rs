@@ -4,8 +4,8 @@ use drawing::{Drawing, Point, Stroke};
 
 use crate::units::PLOTTER_UNIT_MM;
 
-/// Pairs of coordinates a `PD`: plotters with a small buffer, and senders that split at semicolons, take commands of
-/// a hundred bytes or so.
+/// Pairs of coordinates a `PD`: plotters with a small buffer, and senders that split at semicolons,
+/// take commands of a hundred bytes or so.
 const PAIRS_A_COMMAND: usize = 16;
 
 /// How coordinates are written.
@@ -25,7 +25,8 @@ pub enum Encoding {
 pub struct EmitOptions {
     /// Size of a plotter unit, mm.
     pub plotter_unit_mm: f64,
-    /// How far chords may leave arcs and curves, mm, before coordinates are rounded to whole plotter units.
+    /// How far chords may leave arcs and curves, mm, before coordinates are rounded to whole
+    /// plotter units.
     pub tolerance_mm: f64,
     /// How coordinates are written.
     pub encoding: Encoding,
@@ -42,11 +43,13 @@ impl Default for EmitOptions {
     }
 }
 
-/// Writes a drawing in absolute whole plotter units, with `IN SP PU PD` (or `IN SP PE PU`) and nothing else.
+/// Writes a drawing in absolute whole plotter units, with `IN SP PU PD` (or `IN SP PE PU`) and
+/// nothing else.
 ///
-/// Strokes come in the order of the drawing, each from its first point to its last; dots are `PD` without
-/// coordinates. Points that round to the same whole units become one. Strokes of pen 0 draw nothing and are left out.
-/// What is written reads back as the same drawing, rounded; written again, it gives the same bytes.
+/// Strokes come in the order of the drawing, each from its first point to its last; dots are `PD`
+/// without coordinates. Points that round to the same whole units become one. Strokes of pen 0 draw
+/// nothing and are left out. What is written reads back as the same drawing, rounded; written
+/// again, it gives the same bytes.
 pub fn emit(drawing: &Drawing, options: &EmitOptions) -> Vec<u8> {
     let mut out = b"IN;\n".to_vec();
     let mut pen = 0;
@@ -94,7 +97,8 @@ fn decimal(points: &[(i64, i64)], out: &mut Vec<u8>) {
     }
 }
 
-/// One `PE` a stroke: with the pen up to its first point, absolute; from there on steps. A dot is a step of nothing.
+/// One `PE` a stroke: with the pen up to its first point, absolute; from there on steps. A dot is a
+/// step of nothing.
 fn encoded(points: &[(i64, i64)], base: u64, out: &mut Vec<u8>) {
     let Some((&(x, y), rest)) = points.split_first() else { return };
     out.extend_from_slice(if base == 32 { b"PE7<=" } else { b"PE<=" });
@@ -109,7 +113,8 @@ fn encoded(points: &[(i64, i64)], base: u64, out: &mut Vec<u8>) {
     out.extend_from_slice(b";\n");
 }
 
-/// A number in digits of the base, least significant first, its sign in the lowest bit; see the `encoded` module.
+/// A number in digits of the base, least significant first, its sign in the lowest bit; see the
+/// `encoded` module.
 fn number(value: i64, base: u64, out: &mut Vec<u8>) {
     let mut rest = (value.unsigned_abs() << 1) | u64::from(value < 0);
     while rest >= base {

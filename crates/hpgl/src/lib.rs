@@ -6,13 +6,13 @@
 //! assert!(document.diagnostics.is_empty());
 //! ```
 //!
-//! Two passes, two types: [`parse`] turns bytes into a [`Syntax`] (commands, numbers, where they stand),
-//! [`interpret`] gives them their meaning. [`read`] does both at once without keeping the syntax. None of them
-//! fails: what cannot be understood is passed over and told in [`Diagnostic`]s. [`emit()`] writes a drawing as clean
-//! HP-GL.
+//! Two passes, two types: [`parse`] turns bytes into a [`Syntax`] (commands, numbers, where they
+//! stand), [`interpret`] gives them their meaning. [`read`] does both at once without keeping the
+//! syntax. None of them fails: what cannot be understood is skipped and reported as
+//! [`Diagnostic`]s. [`emit()`] writes a drawing as clean HP-GL.
 //!
-//! Positions come out in millimetres, plotter units times [`Options::plotter_unit_mm`] after the file's own scaling and
-//! rotation, y up.
+//! Positions come out in millimetres, plotter units times [`Options::plotter_unit_mm`] after the
+//! file's own scaling and rotation, y up.
 
 mod codes;
 mod diagnostics;
@@ -44,7 +44,7 @@ pub use summary::{Generation, Profile, ProfileReason, Summary, Wrappers};
 pub use syntax::{Command, Syntax};
 pub use units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
 
-/// Takes a file apart without giving it a meaning; linear in its length.
+/// Parses a file without interpreting it; linear in its length.
 pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {
     parser::Parser::new(bytes, options.label_terminator).collect()
 }
@@ -60,7 +60,7 @@ pub fn read(bytes: &[u8], options: &Options) -> Document {
         let before = interpreter.pen_position();
         let more = parser.next().map(|command| interpreter.execute(&command)).is_some();
         if parser.findings.len() > placed {
-            parser.findings.place(placed, before);
+            parser.findings.set_pen_position(placed, before);
             placed = parser.findings.len();
         }
         if !more {

@@ -4,19 +4,20 @@ use std::fmt;
 
 /// The two letters that name a command, in capitals.
 ///
-/// Three names are not of the language: they stand for what the wrappers around it say ([`Mnemonic::RESET`] and so
-/// on), and print in angle brackets.
+/// Three names are not part of the language: they stand for sequences of the wrappers around it
+/// ([`Mnemonic::RESET`], ...), and print in angle brackets.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Mnemonic(pub [u8; 2]);
 
 impl Mnemonic {
-    /// A printer reset (`ESC E`) or the end of a job (`ESC %-12345X`): what was drawn so far is a page of its own.
+    /// A printer reset (`ESC E`) or the end of a job (`ESC %-12345X`): what was drawn so far is a
+    /// page of its own.
     pub const RESET: Self = Self([0, 1]);
     /// A PCL picture frame (`ESC *c #x#Y`); parameters: width and height in plotter units.
     pub const PICTURE_FRAME: Self = Self([0, 2]);
     /// Entry into HP-GL/2 from PCL or RTL (`ESC %#B`); parameter: the number.
     pub const ENTER: Self = Self([0, 3]);
-    /// No command at all: findings between commands are filed under it.
+    /// No command: the name of findings between commands.
     pub(crate) const NONE: Self = Self([0, 0]);
 }
 

@@ -1,10 +1,10 @@
-//! Which program a file looks like: by the way its beginning is written.
+//! The program that wrote a file, recognised by the beginning of the file.
 
 /// How far into the file a beginning goes.
 const BEGINNING: usize = 600;
 
-/// A program, and what stands at the beginning of its files: each of these, the first of them before everything else if it
-/// is said to.
+/// A program, and the byte strings that the beginnings of its files contain, the first of them at
+/// the very start where `starts` is set.
 struct Producer {
     name: &'static str,
     starts: bool,
@@ -29,7 +29,7 @@ const PRODUCERS: &[Producer] = &[
     Producer { name: "an instrument on its bus", starts: true, marks: &[b"OP;"] },
 ];
 
-/// The program that the file looks like; nothing if it looks like none that is known.
+/// The program that the file looks like; `None` if it matches none of those known.
 ///
 /// This is a hint for people: nothing is read differently because of it.
 pub fn producer(bytes: &[u8]) -> Option<&'static str> {
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn producers_are_known_by_their_beginnings() {
+    fn producer_recognition() {
         let begins = |text: &str| producer(text.as_bytes());
         assert_eq!(begins("IN;DF;PS4;SP1;PU100,100;"), Some("vpype"));
         assert_eq!(begins("IN;PU;SP1;PU0,0;PD0,90;"), Some("Inkscape"));

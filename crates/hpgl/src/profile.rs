@@ -1,29 +1,30 @@
-//! What the file does not say: the plotter that it is read for.
+//! The plotter that a file is read for, where the file does not define it.
 
 use drawing::{Point, Rect};
 
 use crate::units::{PLOTTER_UNIT_7475A_MM, PLOTTER_UNIT_MM};
 
-/// What the file does not say.
+/// Properties of the plotter that the file does not define.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Size of a plotter unit, mm: 0.025 by default.
     pub plotter_unit_mm: f64,
     /// The scaling points P1 and P2 until the file sets others, plotter units.
     pub scaling_points: (Point, Point),
-    /// The area that the plotter can reach, plotter units. `RO` turns within it and `IR` measures by it; ink is not
-    /// clipped to it, since many files are made for larger plotters than they name.
+    /// The area that the plotter can reach, plotter units. `RO` turns within it and `IR` measures
+    /// by it; ink is not clipped to it, since many files are made for larger plotters than they
+    /// name.
     pub hard_clip: Rect,
-    /// Whether the file may choose scaling points and hard clip: by the paper that `PS` names by its code, and by
-    /// being HP-GL/2, where P1 and P2 are the corners of the page.
+    /// Whether the file may choose scaling points and hard clip: by the paper that `PS` names by
+    /// its code, and by being HP-GL/2, where P1 and P2 are the corners of the page.
     pub automatic: bool,
     /// The byte that ends labels until `DT` names another; ETX (3) if nothing is given.
     pub label_terminator: Option<u8>,
 }
 
 impl Default for Options {
-    /// An HP 7475A with A4 paper (its P1, P2 and hard clip limits), but with the plotter unit of all other machines; the
-    /// file may choose otherwise.
+    /// An HP 7475A with A4 paper (its P1, P2 and hard clip limits), but with the plotter unit of
+    /// all other machines; the file may choose otherwise.
     fn default() -> Self {
         let [a4, ..] = PAPERS_7475A;
         Self { automatic: true, ..Self::on(PLOTTER_UNIT_MM, a4) }
@@ -43,8 +44,8 @@ impl Options {
         }
     }
 
-    /// The options of one of the [`plotters`] with one of its papers (its first if none is named), in any case; nothing if
-    /// there is no such plotter or paper.
+    /// The options of one of the [`plotters`] with one of its papers (its first if none is named),
+    /// in any case; `None` if there is no such plotter or paper.
     pub fn for_plotter(plotter: &str, paper: Option<&str>) -> Option<Self> {
         let plotter = PLOTTERS.iter().find(|known| known.name.eq_ignore_ascii_case(plotter))?;
         let paper = match paper {
@@ -84,8 +85,8 @@ pub fn plotters() -> &'static [Plotter] {
     PLOTTERS
 }
 
-/// Scaling points and hard clip of the 7475A. The hard clip limits are those that vpype writes files for, the scaling points
-/// of A4 and A3 those that firmware emulating the machine has.
+/// Scaling points and hard clip of the 7475A. The hard clip limits are those that vpype writes
+/// files for, the scaling points of A4 and A3 those that firmware emulating the machine has.
 const PAPERS_7475A: &[Paper; 4] = &[
     Paper {
         name: "a4",
@@ -115,7 +116,8 @@ const fn page(name: &'static str, width_mm: f64, height_mm: f64) -> Paper {
     Paper { name, scaling_points: area, hard_clip: area }
 }
 
-/// A sheet with the origin in its middle, as large plotters have it; P1 and P2 are the corners of what the pen reaches.
+/// A sheet with the origin in its middle, as large plotters have it; P1 and P2 are the corners of
+/// what the pen reaches.
 const fn centred(name: &'static str, half_width: f64, half_height: f64) -> Paper {
     let area = [-half_width, -half_height, half_width, half_height];
     Paper { name, scaling_points: area, hard_clip: area }
@@ -167,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn plotters_are_found_by_name() {
+    fn plotter_lookup_by_name() {
         let a3 = Options::for_plotter("HP7475A", Some("A3")).map(|options| options.hard_clip);
         assert_eq!(a3, Some(Rect::new(0.0, 0.0, 16158.0, 11040.0)));
         assert!(Options::for_plotter("hp7475a", Some("a0")).is_none());

@@ -1,10 +1,10 @@
-//! What a file consists of, and what it was read for.
+//! What a file consists of, and the plotter it was read for.
 
 use drawing::{Point, Rect};
 
 use crate::mnemonic::Mnemonic;
 
-/// What a file consists of, and what it was read for.
+/// What a file consists of, and the plotter it was read for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Summary {
     /// How many commands it has, known ones and unknown ones.
@@ -66,7 +66,7 @@ pub struct Profile {
 /// Why a file was read for a plotter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ProfileReason {
-    /// The file says nothing about its plotter.
+    /// The file does not identify its plotter.
     #[default]
     Assumed,
     /// The options name it.

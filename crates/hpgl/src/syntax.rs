@@ -1,4 +1,4 @@
-//! What a file says, before any of it is given a meaning: commands with their parameters and bytes.
+//! The syntax of a file: commands with their parameters and bytes, without their meaning.
 
 use drawing::Span;
 
@@ -13,12 +13,13 @@ pub struct Command<'a> {
     pub mnemonic: Mnemonic,
     /// Its bytes, from the mnemonic to the terminator.
     pub span: Span,
-    /// Its number in the file, from 1. A very long coordinate list arrives in pieces that share one number.
+    /// Its number in the file, from 1. A very long coordinate list arrives in pieces that share one
+    /// number.
     pub number: usize,
     /// Its numbers.
     pub parameters: &'a [f64],
-    /// The bytes of its text: a label without its terminator, a symbol, the data of a polyline encoded command.
-    /// Empty for all others.
+    /// The bytes of its text: a label without its terminator, a symbol, the data of a polyline
+    /// encoded command. Empty for all others.
     pub text: &'a [u8],
     /// Where the text lies.
     pub text_span: Span,
@@ -48,7 +49,7 @@ pub(crate) struct Entry {
     pub(crate) findings: usize,
 }
 
-/// The commands of a file in order, and what was odd about the way it says them.
+/// The commands of a file in order, and the syntax errors found.
 #[derive(Clone, Debug)]
 pub struct Syntax<'a> {
     pub(crate) bytes: &'a [u8],

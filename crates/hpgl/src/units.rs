@@ -1,6 +1,7 @@
-//! The one place where lengths of the language become millimetres.
+//! Plotter units in millimetres, and limits of coordinates.
 
-/// Size of the plotter unit of HP-GL/2 and most HP-GL plotters, mm: 40 units a millimetre, 1016 an inch, exactly.
+/// Size of the plotter unit of HP-GL/2 and most HP-GL plotters, mm: 40 units a millimetre, 1016 an
+/// inch, exactly.
 pub const PLOTTER_UNIT_MM: f64 = 0.025;
 
 /// Size of the plotter unit of the HP 7475A, mm: 1021 units an inch as measured on the machine.

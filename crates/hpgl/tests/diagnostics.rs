@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 #[test]
-fn diagnostics_of_a_bad_file() {
+fn diagnostics_of_damaged_file() {
     let file = b"\xef\xbb\xbfIN;PD400,0,7;QQ1,2;LBno end;SC0,0,0,1;RO45;PD99999999999,0;AA1;EP;DT\0;\
         SP0;PD1,1;SP1;IW5,5,5,5;PD1000,,0;IW;PM1;PG;PD4\n5,6;PM0;EA1,1;";
     let document = hpgl::read(file, &hpgl::Options::default());
@@ -24,7 +24,7 @@ fn diagnostics_of_a_bad_file() {
 }
 
 #[test]
-fn codes_and_what_they_say() {
+fn diagnostic_code_table() {
     let mut text = String::new();
     for code in hpgl::Code::all() {
         writeln!(text, "{code} {}: {}\n  {}", code.severity(), code.title(), code.explanation()).unwrap();

@@ -26,7 +26,7 @@ fn codes(file: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn hatches_run_to_and_fro_on_a_grid_through_the_anchor() {
+fn hatch_lines_alternate_on_anchor_grid() {
     assert_eq!(ink("IN;SP1;FT3,100;PA0,0;RA400,250;"), ["0,0 400,0", "400,100 0,100", "0,200 400,200"]);
     assert_eq!(ink("IN;SP1;AC0,50;FT3,100;PA0,0;RA400,200;"), ["0,50 400,50", "400,150 0,150"]);
     // A line right on an edge belongs to one of the two areas that meet there.
@@ -40,7 +40,7 @@ fn hatches_run_to_and_fro_on_a_grid_through_the_anchor() {
 }
 
 #[test]
-fn hatches_leave_holes_alone() {
+fn hatch_respects_holes() {
     let polygon = "PA0,0;PM0;PD400,0,400,400,0,400;PM1;PU100,100;PD300,100,300,300,100,300;PM2;";
     assert_eq!(
         ink(&format!("IN;SP1;AC0,50;FT3,150;{polygon}FP;")),
@@ -54,7 +54,7 @@ fn hatches_leave_holes_alone() {
 }
 
 #[test]
-fn hatch_spacing_is_in_current_units() {
+fn hatch_spacing_units() {
     assert_eq!(
         ink("IN;SP1;IP0,0,1000,1000;SC0,10,0,10;FT3,2;PA0,0;RA10,5;"),
         ["0,0 1000,0", "1000,200 0,200", "0,400 1000,400"]
@@ -66,7 +66,7 @@ fn hatch_spacing_is_in_current_units() {
 }
 
 #[test]
-fn solid_fills_are_as_close_as_the_pen_is_thick() {
+fn solid_fill_spacing_is_pen_thickness() {
     // 0.5 mm is 20 plotter units.
     assert_eq!(ink("IN;SP1;PT.5;PA0,0;RA100,50;"), ["0,0 100,0", "100,20 0,20", "0,40 100,40"]);
     assert_eq!(ink("IN;SP1;PT.5;FT2;PA0,0;RA100,30;"), ["0,0 100,0", "0,20 100,20"]);
@@ -75,14 +75,14 @@ fn solid_fills_are_as_close_as_the_pen_is_thick() {
 }
 
 #[test]
-fn raster_fills_become_hatches_and_are_told() {
+fn raster_fill_becomes_reported_hatch() {
     assert!(!ink("IN;SP1;FT11,1;PA0,0;RA400,400;").is_empty());
     assert_eq!(codes("IN;SP1;FT11,1;PA0,0;RA400,400;"), ["H0221"]);
     assert!(ink("IN;SP1;FT10,0;PA0,0;RA400,400;").is_empty());
 }
 
 #[test]
-fn fills_are_clipped_and_come_back_for_the_edge() {
+fn fill_clipped_at_window() {
     assert_eq!(
         ink("IN;SP1;IW0,0,50,50;FT3,40;PA0,0;RA100,100;EP;"),
         ["0,0 50,0", "50,40 0,40", "0,0 50,0", "0,50 0,0"]
@@ -90,7 +90,7 @@ fn fills_are_clipped_and_come_back_for_the_edge() {
 }
 
 #[test]
-fn absurd_hatches_are_given_up() {
+fn hatch_budget() {
     let file = "IN;SP1;FT3,.001;PA0,0;RA1000000,1000000;PD5,5;";
     assert_eq!(codes(file), ["H0223"]);
     assert_eq!(ink(file), ["0,0 5,5"]);
@@ -103,7 +103,7 @@ fn absurd_hatches_are_given_up() {
 fn line_patterns() {
     // 10 mm are 400 plotter units; half of them ink.
     assert_eq!(ink("IN;SP1;LT2,10,1;PA0,0;PD1000,0;"), ["0,0 200,0", "400,0 600,0", "800,0 1000,0"]);
-    // The pattern goes on round corners, and over lifts.
+    // The pattern continues round corners, and over lifts.
     assert_eq!(
         ink("IN;SP1;LT2,10,1;PA0,0;PD500,0,500,500;"),
         ["0,0 200,0", "400,0 500,0 500,100", "500,300 500,500"]
@@ -128,7 +128,7 @@ fn line_patterns() {
 }
 
 #[test]
-fn shapes_have_a_pattern_of_their_own() {
+fn shape_line_pattern_is_independent() {
     assert_eq!(
         ink("IN;SP1;LT2,10,1;PD300,0;ER200,100;PD600,0;"),
         ["0,0 200,0", "300,0 500,0", "400,100 300,100 300,0", "400,0 600,0"]
@@ -144,7 +144,7 @@ fn ticks() {
     );
     assert_eq!(ink(&format!("IN;SP1;{points}TL10;PA100,200;XT;")), ["100,200 100,400"]);
     assert_eq!(ink(&format!("IN;SP1;{points}PA100,200;XT;")), ["100,190 100,210"]);
-    // The pen goes on where it was; a line pattern does not touch ticks.
+    // The pen continues where it was; a line pattern does not touch ticks.
     assert_eq!(
         ink(&format!("IN;SP1;{points}LT2,10,1;PA0,0;PD100,0;XT;PD300,0;")),
         ["0,0 100,0", "100,-10 100,10", "100,0 200,0"]
@@ -200,9 +200,10 @@ fn covers(corners: &[(i32, i32)], x: f64, y: f64) -> bool {
     inside
 }
 
-/// HP's manual of PCL 5 (LT) lists the commands after which the rest of a pattern is forgotten; lifting the pen is none of them.
+/// HP's manual of PCL 5 (LT) lists the commands after which the rest of a pattern is forgotten;
+/// lifting the pen is none of them.
 #[test]
-fn line_patterns_begin_anew_after_some_commands() {
+fn line_pattern_restart_commands() {
     for (between, anew) in [
         ("PU;", false),
         ("EA400,400;", false),

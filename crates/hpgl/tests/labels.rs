@@ -1,5 +1,5 @@
-//! Labels, symbols and user characters: where they stand, how large they are, where the pen goes after them. The shapes
-//! of letters are the font's business.
+//! Labels, symbols and user characters: where they stand, how large they are, where the pen goes
+//! after them. The shapes of letters are the font's business.
 
 use drawing::Rect;
 use hpgl::{Document, Options, read};
@@ -38,7 +38,7 @@ fn close(actual: Rect, expected: (f64, f64, f64, f64)) {
 }
 
 #[test]
-fn size_and_advance() {
+fn label_size_and_advance() {
     // 1 cm wide, 2 cm high: 400 by 800; a cell is one and a half widths.
     close(bounds(b"IN;SP1;SI1,2;PA1000,1000;LBA\x03"), (1000.0, 1000.0, 1400.0, 1800.0));
     assert_eq!(end("IN;SP1;SI1,2;PA1000,1000;LBAII\x03"), (1000.0 + 3.0 * 600.0, 1000.0));
@@ -51,13 +51,13 @@ fn size_and_advance() {
     close(bounds(b"IN;SP1;SI1,-2;PA1000,1000;LBA\x03"), (1000.0, 200.0, 1400.0, 1000.0));
     assert_eq!(end("IN;SP1;SI-1,2;PA1000,1000;LBA\x03"), (400.0, 1000.0));
     assert_eq!(end("IN;SP1;SI1,2;ES.5;PA0,0;LBAA\x03"), (1800.0, 0.0));
-    // Proportional spacing: narrow letters take less room.
+    // Proportional spacing: narrow letters are narrower.
     let (x, _) = end("IN;SP1;SI1,2;SD2,1;SS;PA0,0;LBiii\x03");
     assert!(x < 1100.0, "{x} instead of 1800 in cells of one width");
 }
 
 #[test]
-fn direction_and_slant() {
+fn label_direction_and_slant() {
     close(bounds(b"IN;SP1;SI1,2;DI0,1;PA1000,1000;LBA\x03"), (200.0, 1000.0, 1000.0, 1400.0));
     assert_eq!(end("IN;SP1;SI1,2;DI-1,0;PA1000,1000;LBA\x03"), (400.0, 1000.0));
     // Relative to P1 and P2: their diagonal.
@@ -90,7 +90,7 @@ fn label_origins() {
 }
 
 #[test]
-fn control_characters_and_cells() {
+fn label_control_characters() {
     let size = "IN;SP1;SI1,2;PA1000,5000;";
     assert_eq!(end(&format!("{size}LBAB\r\x03")), (1000.0, 5000.0));
     assert_eq!(end(&format!("{size}LBAB\r\n\x03")), (1000.0, 3400.0));
@@ -113,7 +113,7 @@ fn control_characters_and_cells() {
 }
 
 #[test]
-fn pens_and_patterns() {
+fn label_pen_and_line_pattern() {
     // A label is drawn with the pen up or down, solid, and leaves the pen as it was.
     let document = document(b"IN;SP3;LT2,1,1;PU0,0;LBI\x03PA100,100;PD;PU;");
     let strokes = &document.pages[0].drawing.strokes;
@@ -143,7 +143,7 @@ fn character_sets() {
 }
 
 #[test]
-fn symbols_stand_on_points() {
+fn symbol_mode_positions() {
     let document = document(b"IN;SP1;SI1,2;SM+;PA1000,1000;PD2000,1000;SM;PD3000,1000;PU;");
     let strokes = &document.pages[0].drawing.strokes;
     // Two bars at each of two points, and the line in two strokes.
@@ -154,7 +154,7 @@ fn symbols_stand_on_points() {
 }
 
 #[test]
-fn user_characters_have_a_grid_in_their_cell() {
+fn user_character_grid() {
     // A width is 4 units, a height 8.
     close(bounds(b"IN;SP1;SI1,2;PA100,100;UC99,4,0,0,8,-4,0,0,-8;"), (100.0, 100.0, 500.0, 900.0));
     assert_eq!(end("IN;SP1;SI1,2;PA100,100;UC99,4,0"), (700.0, 100.0));

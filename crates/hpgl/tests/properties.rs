@@ -58,20 +58,21 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 500 } else { 20_000 }))]
 
     #[test]
-    fn any_bytes_are_read(bytes in any_file()) {
+    fn reading_any_bytes(bytes in any_file()) {
         check(&bytes);
     }
 
     #[test]
-    fn every_prefix_is_read(bytes in almost_hpgl()) {
+    fn reading_every_prefix(bytes in almost_hpgl()) {
         for end in 0..bytes.len().min(120) {
             check(&bytes[..end]);
         }
     }
 
-    /// What is emitted reads back as what was emitted: the second time round nothing changes any more.
+    /// What is emitted reads back as what was emitted: the second time round nothing changes any
+    /// more.
     #[test]
-    fn emitting_is_a_fixed_point(bytes in almost_hpgl()) {
+    fn emit_fixed_point(bytes in almost_hpgl()) {
         for encoding in [Encoding::Decimal, Encoding::Base64, Encoding::Base32] {
         let options = EmitOptions { encoding, ..EmitOptions::default() };
         for page in read(&bytes, &Options::default()).pages {
@@ -92,7 +93,7 @@ proptest! {
 }
 
 #[test]
-fn one_command_as_long_as_a_file() {
+fn single_command_of_file_length() {
     let mut file = b"IN;SP1;PA0,0;PD".to_vec();
     for k in 0..100_000 {
         file.extend_from_slice(format!("{},{},", k % 1000, k / 1000).as_bytes());
@@ -104,10 +105,11 @@ fn one_command_as_long_as_a_file() {
     assert_eq!(document.summary.commands, 4);
 }
 
-/// Inputs that tempt a reader to look at the rest of the file again and again. Each is read in a second or so in an
-/// unoptimised build where time follows length; where it follows its square, 4 MB take hours.
+/// Inputs that tempt a reader to look at the rest of the file again and again. Each is read in a
+/// second or so in an unoptimised build where time follows length; where it follows its square, 4
+/// MB take hours.
 #[test]
-fn time_follows_length() {
+fn linear_time() {
     let repeated = |unit: &[u8]| unit.repeat(2_000_000 / unit.len());
     for unit in [
         &b"LBhello;"[..],

@@ -1,7 +1,7 @@
 //! What real files do to the language: one small file a habit, and the ink that it must give.
 //!
-//! Expected geometry rests on the HP-GL/2 rules as GhostPDL's interpreter and hp2xx show them on probe files; where the
-//! two differ, the comment says which one is followed and why.
+//! Expected geometry rests on the HP-GL/2 rules as GhostPDL's interpreter and hp2xx show them on
+//! probe files; where the two differ, the comment says which one is followed and why.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,8 @@ fn document(bytes: &[u8]) -> Document {
     document
 }
 
-/// The strokes of the first page in plotter units: `pen: x,y x,y ...`, curves marked by `~` before their end.
+/// The strokes of the first page in plotter units: `pen: x,y x,y ...`, curves marked by `~` before
+/// their end.
 fn ink(document: &Document) -> Vec<String> {
     let stroke = |stroke: &drawing::Stroke| {
         let plu = |mm: f64| {
@@ -42,7 +43,7 @@ fn check(bytes: &[u8], strokes: &[&str], diagnostics: &[&str]) {
     assert_eq!(codes(&document), diagnostics, "diagnostics of {:?}", bytes.escape_ascii().to_string());
 }
 
-/// The same corner, however it is said.
+/// The same corner in different notations.
 #[track_caller]
 fn corner(bytes: &[u8], diagnostics: &[&str]) {
     check(bytes, &["1: 0,0 400,0 400,400"], diagnostics);
@@ -73,8 +74,8 @@ fn any_case() {
 }
 
 #[test]
-fn numbers_over_line_ends() {
-    // Interpreters pass over line ends inside numbers: files wrapped at a fixed width.
+fn line_ends_inside_numbers() {
+    // Interpreters skip line ends inside numbers: files wrapped at a fixed width.
     corner(b"IN;SP1;PA0,0;PD40\n0,0,400,40\r\n0;PU;", &["H0109"]);
     // One pair a line, as written by hand: joined numbers would make an odd count.
     corner(b"IN;SP1;PA0,0;PD400,0\n400,400;PU;", &["H0109"]);
@@ -108,7 +109,7 @@ fn decimals_exponents_and_large_numbers() {
 }
 
 #[test]
-fn empty_parameters_and_odd_counts() {
+fn empty_parameters_and_odd_coordinates() {
     check(b"IN;SP1;PA0,0;PD400,,400;PD400,0;PU;", &["1: 0,0 400,400 400,0"], &["H0107"]);
     corner(b"IN;SP1;PA0,0;PD,400,0;PD400,400;PU;SP0;", &["H0107"]);
     // hp2xx gives the whole file up.
@@ -130,7 +131,7 @@ fn stray_bytes() {
 }
 
 #[test]
-fn names_that_are_none() {
+fn unknown_names_and_prose() {
     corner(b"IN;SP1;PA0,0;ZQ1,2,3;PD400,0;XX;PD400,400;PU;SP0;", &["H0101", "H0101"]);
     corner(b"IN;SP1;PA0,0;Z;PD400,0;PD400,400;PU;SP0;", &["H0101"]);
     corner(b"IN;SP1;PA0,0;ZPD400,0;ZQPD400,400;PU;", &["H0101", "H0101"]);
@@ -182,7 +183,7 @@ fn wrappers() {
 }
 
 #[test]
-fn text_does_not_swallow_the_plot() {
+fn unterminated_text_recovery() {
     let hidden = |text: &[u8]| {
         let document = document(text);
         assert!(
@@ -220,7 +221,7 @@ fn pens() {
     corner(b"IN;PA0,0;PD400,0,400,400;PU;", &["H0201"]);
     check(b"IN;SP1;PD400,0;SP0;PD400,400;PU;", &["1: 0,0 400,0"], &["H0202"]);
     check(b"IN;SP1;PD400,0;SP;PD400,400;PU;", &["1: 0,0 400,0"], &["H0202"]);
-    // A whole drawing is not lost for a pen that is in the holder.
+    // A drawing made with a pen put into the holder by hand is drawn.
     corner(b"IN; SP0; PA0,0;PD400,0,400,400;PU;", &["H0222"]);
     // A new pen is a new stroke, even where the old one is still down.
     check(b"IN;SP1;PD400,0;SP2;PD400,400;PU;", &["1: 0,0 400,0", "2: 400,0 400,400"], &[]);
@@ -228,7 +229,7 @@ fn pens() {
 }
 
 #[test]
-fn moves() {
+fn pen_moves() {
     corner(b"IN;SP1;PU0,0;PD;PA400,0,400,400;PU;SP0;", &[]);
     corner(b"IN;SP1;PA0,0;PR;PD400,0,0,400;PU;PA;SP0;", &[]);
     corner(b"IN;SP1;PDPR400,0PA400,400PU", &[]);
@@ -250,7 +251,7 @@ fn dots() {
 }
 
 #[test]
-fn nothing_to_draw() {
+fn empty_drawings() {
     check(b"", &[], &[]);
     check(b"IN;", &[], &[]);
     assert_eq!(read(b"", &Options::default()).pages.len(), 1);
@@ -264,7 +265,8 @@ fn arcs() {
     // A coarse chord angle is meant to be seen; the usual one is not.
     check(b"IN;SP1;PA400,0;PD;AA0,0,90,45;PU;", &["1: 400,0 282.8427,282.8427 0,400"], &[]);
     check(b"IN;SP1;PA400,0;PD;AA0,0,90,5;PU;", &["1: 400,0 ~0,400"], &[]);
-    // Radius 4000, 10 off the chord: 2 acos(1 - 10/4000) = 8.1 degrees, so that 90 degrees take twelve chords.
+    // Radius 4000, 10 off the chord: 2 acos(1 - 10/4000) = 8.1 degrees, so that 90 degrees take
+    // twelve chords.
     let chords = ink(&document(b"IN;SP1;CT1;PA4000,0;PD;AA0,0,90,10;PU;"));
     assert_eq!(chords[0].split(' ').count(), 1 + 1 + 12);
     // Turns beyond the first retrace it; the pen still ends where it should.
@@ -287,7 +289,8 @@ fn arcs_through_points() {
         let top = document.pages[0].drawing.bounding_box().unwrap().y1;
         assert!((top - 5.0).abs() < 1e-9, "over the upper side");
     }
-    // All on a line, in between: a line. Beyond the end: there and back. First equal to last: a circle.
+    // All on a line, in between: a line. Beyond the end: there and back. First equal to last: a
+    // circle.
     check(b"IN;SP1;PA0,0;PD;AT200,0,400,0;PU;", &["1: 0,0 400,0"], &["H0215"]);
     check(b"IN;SP1;PA0,0;PD;AT600,0,400,0;PU;", &["1: 0,0 600,0 400,0"], &["H0215"]);
     check(b"IN;SP1;PA0,0;PD;AT0,0,400,0;PU;", &["1: 0,0 400,0"], &["H0215"]);
@@ -322,7 +325,7 @@ fn curves() {
 }
 
 #[test]
-fn rectangles_and_wedges_leave_the_pen_where_it_is() {
+fn rectangles_and_wedges_keep_pen_position() {
     check(
         b"IN;SP1;PA100,100;EA500,300;PD0,0;",
         &["1: 100,100 500,100 500,300 100,300 100,100", "1: 100,100 0,0"],
@@ -385,7 +388,7 @@ fn scales() {
 }
 
 #[test]
-fn rotation_keeps_the_page_in_the_positive_quadrant() {
+fn rotation_keeps_page_in_positive_quadrant() {
     check(b"IN;SP1;PS4000,2000;RO90;PA0,0;PD400,0,400,200;PU;", &["1: 4000,0 4000,400 3800,400"], &[]);
     check(b"IN;SP1;PS4000,2000;RO180;PA0,0;PD400,200;PU;", &["1: 4000,2000 3600,1800"], &[]);
     check(b"IN;SP1;PS4000,2000;RO270;PA0,0;PD400,200;PU;", &["1: 0,2000 200,1600"], &[]);
@@ -411,11 +414,12 @@ fn windows() {
     // The page that PS sets clips, a default one does not.
     check(b"IN;SP1;PS4000,2000;PD4000,0,5000,0;", &["1: 0,0 4000,0"], &["H0225"]);
     check(b"IN;SP1;PD40000,0;", &["1: 0,0 40000,0"], &[]);
-    // The longer side of the page lies along x, whichever PS names first: real CAD files rely on it.
+    // The longer side of the page lies along x, whichever PS names first: real CAD files rely on
+    // it.
     check(b"IN;SP1;PS2000,4000;PD4000,2000;", &["1: 0,0 4000,2000"], &[]);
     check(b"IN;SP1;PS2000,4000;RO90;PD2000,4000;", &["1: 0,0 0,2000"], &[]);
     check(b"IN;SP1;IW5,5,5,9;PD400,0;IW;PD400,400;", &["1: 400,0 400,400"], &["H0211", "H0210"]);
-    // A window in user units moves with the scaling points.
+    // A window in user units pen_moves with the scaling points.
     check(
         b"IN;SP1;IP0,0,100,100;SC0,10,0,10;IW0,0,5,10;IP0,0,1000,1000;PA0,0;PD10,0;",
         &["1: 0,0 500,0"],
@@ -426,7 +430,7 @@ fn windows() {
 }
 
 #[test]
-fn paper_by_code_is_not_a_page_of_four_units() {
+fn paper_size_code() {
     check(b"IN;DF;PS4;SP1;PD400,0;", &["1: 0,0 400,0"], &["H0213"]);
     // One length: a page open to its other side.
     check(b"BP;IN;PS10668;SP1;PD400,20000;", &["1: 0,0 400,20000"], &[]);
@@ -487,7 +491,7 @@ fn pages() {
 }
 
 #[test]
-fn findings_are_counted_not_repeated() {
+fn diagnostic_counts() {
     let mut file = b"IN;SP1;".to_vec();
     for _ in 0..1000 {
         file.extend_from_slice(b"QQ1,2;PD1,2,3;ZZ;");
@@ -499,7 +503,7 @@ fn findings_are_counted_not_repeated() {
 }
 
 #[test]
-fn places_of_findings() {
+fn diagnostic_positions() {
     let document = document(b"IN;SP1;PA400,800;QQ1;");
     let diagnostic = &document.diagnostics[0];
     assert_eq!((diagnostic.span.start, diagnostic.span.end), (17, 19));
@@ -508,7 +512,7 @@ fn places_of_findings() {
 }
 
 #[test]
-fn strokes_know_their_bytes() {
+fn stroke_source_spans() {
     let file = b"IN;SP1;PU0,0;PD400,0;PA400,400;PU;";
     let document = document(file);
     let source = document.pages[0].drawing.strokes[0].source();
@@ -516,7 +520,7 @@ fn strokes_know_their_bytes() {
 }
 
 #[test]
-fn pens_and_what_the_file_says_about_them() {
+fn pen_settings() {
     let document = document(b"IN;SP1;VS20;PW.5;PD400,0;VS10,2;FS3,2;SP2;PD400,400;SP3;PD0,0;");
     let pens = &document.pages[0].pens;
     assert_eq!(pens.len(), 3);
@@ -524,7 +528,7 @@ fn pens_and_what_the_file_says_about_them() {
     assert_eq!((of(1).speed_mm_s, of(1).width_mm, of(1).force), (Some(200.0), Some(0.5), None));
     assert_eq!((of(2).speed_mm_s, of(2).force), (Some(100.0), Some(3.0)));
     assert_eq!(of(3).speed_mm_s, Some(200.0));
-    // The gentlest speed that the pen was ever told while it drew.
+    // The lowest speed set while the pen drew.
     let slow = crate::document(b"IN;SP1;VS5;VS20;PD400,0;VS10;PD400,400;VS30;PU;");
     assert_eq!(slow.pages[0].pens[&hpgl::Pen(1)].speed_mm_s, Some(100.0));
     // Percent of the diagonal, 25 mm.
@@ -533,8 +537,9 @@ fn pens_and_what_the_file_says_about_them() {
 }
 
 #[test]
-fn the_file_chooses_its_plotter() {
-    // No IP: the scaling points of the 7475A on A4, on A3 where PS says so, the corners of the page in HP-GL/2.
+fn plotter_profile_selection() {
+    // No IP: the scaling points of the 7475A on A4, on A3 where PS names it, the corners of the
+    // page in HP-GL/2.
     let scaled =
         |setup: &str, rest: &str| document(format!("{setup}IN;{rest}SP1;SC0,1,0,1;PA0,0;PD1,1;").as_bytes());
     assert_eq!(ink(&scaled("", "")), ["1: 603,521 10603,7721"]);
@@ -552,7 +557,7 @@ fn the_file_chooses_its_plotter() {
 }
 
 #[test]
-fn what_a_file_was_read_for_is_on_record() {
+fn plotter_profile_in_summary() {
     let summary = |file: &[u8]| read(file, &Options::default()).summary;
     let plain = summary(b"IN;SP1;PU0,0;PD400,0;");
     assert_eq!(plain.generation(), Generation::HpGl);
@@ -581,9 +586,10 @@ fn what_a_file_was_read_for_is_on_record() {
     assert_eq!(read(b"IN;SP1;PD1,2;", &named).summary.profile.reason, ProfileReason::Options);
 }
 
-/// Each of these once was, or could be, a hang, a crash or ink at infinity: it must be told, and the rest of the file drawn.
+/// Each of these once was, or could be, a hang, a crash or ink at infinity: it must be reported,
+/// and the rest of the file drawn.
 #[test]
-fn absurd_numbers_are_told() {
+fn absurd_numbers_are_reported() {
     for (file, code) in [
         (&b"IN;SP1;PU0,0;PD99999999999,0;"[..], "H0108"),
         (b"IN;SP1;PU0,0;PD1e400,0;", "H0108"),
@@ -612,9 +618,9 @@ fn absurd_numbers_are_told() {
     }
 }
 
-/// `AutoCAD`'s driver numbers its colours from 0 on; a file of its lost a good part of its ink.
+/// `AutoCAD`'s driver numbers its colours from 0 on; much of a file's ink was missing without this.
 #[test]
-fn pen_zero_with_a_colour_draws() {
+fn coloured_pen_zero_is_drawn() {
     let palette = b"BPIN;NP8;PC0,0,255,255;SP0;PU0,0;PD400,0;SP1;PU0,40;PD400,40;PU;";
     check(palette, &["2: 0,0 400,0", "1: 0,40 400,40"], &["H0228"]);
     let late = b"BPIN;SP0;PU0,0;PD400,0;PC0,0,0,255;SP1;PU0,40;PD400,40;PU;";

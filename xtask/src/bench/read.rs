@@ -1,7 +1,9 @@
-//! `cargo xtask bench read`: bytes to drawing by CPU time and memory, beside hp2xx where it is installed and beside a ceiling.
+//! `cargo xtask bench read`: reading speed and memory, compared with hp2xx (where installed) and
+//! with an upper bound.
 //!
-//! The ceiling is what no reader of numbers can beat: a pass over the bytes that does nothing but turn digits into a list of
-//! integers (for encoded polylines, digits of base 64 or 32 into steps). hp2xx reads and writes SVG.
+//! The upper bound ("ceiling") is a pass over the bytes that only turns digits into a list of
+//! integers (for encoded polylines, digits of base 64 or 32 into steps). hp2xx reads and writes
+//! SVG.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -18,8 +20,8 @@ enum Wanted {
     Nothing,
 }
 
-/// The inputs, what is wanted of reading them, and whether the drawing should fit in memory three times their size: arcs and
-/// labels are more drawing than that by what they are.
+/// The inputs, the goal of each, and whether peak memory must stay below [`MEMORY`] times their
+/// size. Drawings of arcs and labels are larger than that.
 const CLASSES: [(&str, Wanted, bool); 8] = [
     ("text", Wanted::Speed(200.0), true),
     ("flow", Wanted::Speed(200.0), true),
@@ -32,7 +34,8 @@ const CLASSES: [(&str, Wanted, bool); 8] = [
 ];
 const GROWTH: f64 = 1.05;
 const MEMORY: f64 = 3.0;
-/// hp2xx draws chords of 5 degrees: on the benchmark's arcs, 0.0076 mm off on average. Ours are flattened finer than that.
+/// hp2xx draws chords of 5 degrees: on the benchmark's arcs, 0.0076 mm off on average. Ours are
+/// flattened finer than that.
 const CHORD_MM: f64 = 0.005;
 
 /// One class of inputs, measured.
@@ -49,7 +52,8 @@ struct Figures {
     bytes: [f64; 2],
 }
 
-/// Measures and prints a table; true if every goal is met. `generator` is a Python script that makes the inputs; without it they are made here.
+/// Measures and prints a table; true if every goal is met. `generator` is a Python script that
+/// makes the inputs; without it they are made here.
 pub(super) fn run(generator: Option<&Path>) -> Result<bool> {
     let work = tempfile::tempdir()?;
     let folder = work.path();
@@ -140,7 +144,7 @@ fn measure(folder: &Path, class: &str) -> Result<Figures> {
     Ok(Figures { small: one, large: ten, flattened, ceiling, peer, memory, bytes })
 }
 
-/// Every run of digits as a number, whatever it means.
+/// Every run of digits as a number.
 fn integers(bytes: &[u8]) -> Vec<u32> {
     let mut numbers = Vec::new();
     let (mut number, mut inside) = (0_u32, false);
@@ -157,7 +161,7 @@ fn integers(bytes: &[u8]) -> Vec<u32> {
     numbers
 }
 
-/// Every number of base 64 (6 bits) or 32 (5 bits), whatever it means.
+/// Every number of base 64 (6 bits) or 32 (5 bits), .
 fn steps(bytes: &[u8], bits: u32) -> Vec<u32> {
     let (last_digit, base) = if bits == 6 { (191, 64) } else { (95, 32) };
     let mut numbers = Vec::new();
@@ -175,7 +179,8 @@ fn steps(bytes: &[u8], bits: u32) -> Vec<u32> {
     numbers
 }
 
-/// CPU time of hp2xx on a file, s: nothing where it is not installed, or where the system does not tell.
+/// CPU time of hp2xx on a file, s; `None` if it is not installed or the system does not report CPU
+/// time.
 fn hp2xx(file: &Path, folder: &Path) -> Result<Option<f64>> {
     let Some(before) = children() else { return Ok(None) };
     let run = Command::new("hp2xx")
@@ -192,7 +197,8 @@ fn hp2xx(file: &Path, folder: &Path) -> Result<Option<f64>> {
 /// Linux: CPU time of all children that have ended, s (their user and system time in hundredths).
 fn children() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The name in parentheses may hold blanks; cutime and cstime are the 14th and 15th words after it.
+    // The name in parentheses may hold blanks; cutime and cstime are the 14th and 15th words after
+    // it.
     let words: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
     Some((words.get(13)?.parse::<f64>().ok()? + words.get(14)?.parse::<f64>().ok()?) / 100.0)
 }
@@ -204,7 +210,8 @@ fn memory(file: &Path) -> Result<Option<f64>> {
     Ok(String::from_utf8_lossy(&run.stdout).trim().parse().ok())
 }
 
-/// Reads one file into a drawing and prints the largest resident memory so far, bytes, where the system tells it.
+/// Reads one file into a drawing and prints its peak resident memory, bytes, where the system
+/// reports it.
 pub(crate) fn once(file: &Path) -> Result<bool> {
     let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
     let document = hpgl::read(&bytes, &hpgl::Options::default());

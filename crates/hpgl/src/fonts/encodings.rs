@@ -1,14 +1,17 @@
 //! Character sets: what the bytes of labels stand for.
 
-/// A set of characters for the bytes of labels. The first half is ASCII in all of them, but for the ISO 646 variants.
+/// A set of characters for the bytes of labels. The first half is ASCII in all of them, but for the
+/// ISO 646 variants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum CharacterSet {
-    /// Code page 1252, which holds ISO 8859-1: what files without a word about it are written in today.
+    /// Code page 1252, which holds ISO 8859-1: what files without a word about it are written in
+    /// today.
     #[default]
     Latin1,
     /// HP's own 8-bit set.
     Roman8,
-    /// The upper half of HP's set in the places of ASCII: the Roman extensions of plotters with seven bits.
+    /// The upper half of HP's set in the places of ASCII: the Roman extensions of plotters with
+    /// seven bits.
     RomanExtensions,
     /// Code page 437 of the IBM PC.
     CodePage437,
@@ -24,8 +27,9 @@ const NATIONAL: &[u8] = b"#$@[\\]^`{|}~";
 impl CharacterSet {
     /// The set of a 7475A's `CS` and `CA`, if it is known here.
     ///
-    /// The numbers of national sets follow ISO 646 registrations: 30 Swedish, 31 the same for names, 32 Norwegian, 33
-    /// German, 34 French, 35 British, 36 Italian, 37 Spanish, 38 Portuguese, 39 Norwegian 2.
+    /// The numbers of national sets follow ISO 646 registrations: 30 Swedish, 31 the same for
+    /// names, 32 Norwegian, 33 German, 34 French, 35 British, 36 Italian, 37 Spanish, 38
+    /// Portuguese, 39 Norwegian 2.
     pub(crate) fn of_plotter(number: f64) -> Option<Self> {
         Some(match number as i32 {
             0 | 6 | 9 => Self::Latin1,
@@ -43,8 +47,8 @@ impl CharacterSet {
         })
     }
 
-    /// The set of HP-GL/2's `SD1,n` and `AD1,n`, if it is known here. A symbol set that PCL calls `8U` is 8 * 32 + 21: the
-    /// number and the place of the letter after `@`.
+    /// The set of HP-GL/2's `SD1,n` and `AD1,n`, if it is known here. A symbol set that PCL calls
+    /// `8U` is 8 * 32 + 21: the number and the index of the letter after `@`.
     pub(crate) fn of_symbol_set(value: f64) -> Option<Self> {
         Some(match value as i32 {
             // 0U ASCII, 0N ECMA-94 Latin 1, 19U and 9U Windows
@@ -66,12 +70,13 @@ impl CharacterSet {
         })
     }
 
-    /// The character of a byte that is none of the control bytes; the replacement character where there is none.
+    /// The character of a byte that is none of the control bytes; the replacement character where
+    /// there is none.
     pub(crate) fn character(self, byte: u8) -> char {
         let upper = match self {
             Self::Iso646(letters) => {
-                let place = NATIONAL.iter().position(|&b| b == byte);
-                return place.and_then(|place| letters.chars().nth(place)).unwrap_or(char::from(byte & 0x7f));
+                let index = NATIONAL.iter().position(|&b| b == byte);
+                return index.and_then(|index| letters.chars().nth(index)).unwrap_or(char::from(byte & 0x7f));
             }
             Self::Latin1 => CODE_PAGE_1252,
             Self::RomanExtensions => {
@@ -124,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_letter_in_each_set() {
+    fn character_sets_agree_on_letters() {
         for (set, byte) in [
             (CharacterSet::Latin1, 0xfc),
             (CharacterSet::Roman8, 0xcf),

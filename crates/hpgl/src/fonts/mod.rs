@@ -7,7 +7,8 @@ pub(crate) use encodings::CharacterSet;
 
 /// Height of capitals, units of the font.
 pub const CAP_HEIGHT: f64 = 21.0;
-/// Width of wide capitals such as A, units of the font: what plotters call the width of a character.
+/// Width of wide capitals such as A, units of the font: what plotters call the width of a
+/// character.
 pub(crate) const BODY_WIDTH: f64 = 14.0;
 
 /// A character as strokes. The base line is at 0, y goes up.
@@ -51,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn glyphs_are_in_order_and_whole() {
+    fn glyph_table_is_sorted_and_complete() {
         assert!(newstroke::GLYPHS.windows(2).all(|pair| pair[0].0 < pair[1].0));
         for &(character, advance, strokes) in newstroke::GLYPHS {
             assert!(advance > 0, "{character}");
@@ -67,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn a_capital_stands_on_the_base_line() {
+    fn capital_on_base_line() {
         let glyph = Glyph::of('A').unwrap();
         let points: Vec<(f64, f64)> = glyph.strokes().flatten().collect();
         let height = points.iter().map(|p| p.1).fold(0.0, f64::max);

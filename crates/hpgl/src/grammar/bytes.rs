@@ -66,7 +66,8 @@ pub(crate) fn gap(input: Input<'_>) -> Parsed<'_, Input<'_>> {
         .parse(input)
 }
 
-/// `unread = { byte - letter - ESC - ";" - ":" } [ ";" | ":" ]`: the parameters of something that is no command.
+/// `unread = { byte - letter - ESC - ";" - ":" } [ ";" | ":" ]`: the parameters of something that
+/// is no command.
 pub(crate) fn unread(input: Input<'_>) -> Parsed<'_, Input<'_>> {
     let parameters = take_while(|b| !matches!(class(b), Class::Letter | Class::Escape | Class::Terminator));
     recognize((parameters, opt(one(Class::Terminator)))).parse(input)

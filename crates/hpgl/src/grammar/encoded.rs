@@ -1,8 +1,8 @@
 //! Polyline encoded (`PE`): where its data end, and what numbers and flags they hold.
 //!
-//! A number is written in digits of base 64 or, after the flag `7`, of base 32, the least significant first. Base 64:
-//! all but the last digit are the bytes 63 to 126, the last one 191 to 254. Base 32: 63 to 94, and 95 to 126. Its
-//! lowest bit is the sign, the rest the size.
+//! A number is written in digits of base 64 or, after the flag `7`, of base 32, the least
+//! significant first. Base 64: all but the last digit are the bytes 63 to 126, the last one 191 to
+//! 254. Base 32: 63 to 94, and 95 to 126. Its lowest bit is the sign, the rest the size.
 
 use super::escape::device_control;
 use super::name::form_of;
@@ -53,10 +53,12 @@ fn data_byte(input: Input<'_>, reencoded: bool) -> Parsed<'_, u8> {
     }
 }
 
-/// `data = { flag | coordinate | filler }`, up to the first byte that cannot be data, as a rule the semicolon.
+/// `data = { flag | coordinate | filler }`, up to the first byte that cannot be data, as a rule the
+/// semicolon.
 ///
-/// Where that is missing, the letters of the next command look like the beginning of a number: then the data end after
-/// their last whole number. `is_reencoded` is called at the first byte pair that could be one byte re-encoded as UTF-8.
+/// Where that is missing, the letters of the next command look like the beginning of a number: then
+/// the data end after their last whole number. `is_reencoded` is called at the first byte pair that
+/// could be one byte re-encoded as UTF-8.
 pub(crate) fn data(input: Input<'_>, mut is_reencoded: impl FnMut() -> bool) -> Parsed<'_, Input<'_>> {
     // Longer than any number: its digits hold more than 64 bits.
     const TOO_LONG: usize = 64;
@@ -103,7 +105,7 @@ pub(crate) fn data(input: Input<'_>, mut is_reencoded: impl FnMut() -> bool) -> 
 /// A flag or a number of the data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Item {
-    /// The pen to go on with.
+    /// Selects a pen.
     Pen(f64),
     /// The next pair is travelled with the pen up.
     Up,
@@ -125,7 +127,8 @@ enum Number {
     Missing,
 }
 
-/// `number = { digit | filler } last-digit`, least significant digit first, the sign in the lowest bit.
+/// `number = { digit | filler } last-digit`, least significant digit first, the sign in the lowest
+/// bit.
 fn number(input: Input<'_>, base32: bool, reencoded: bool) -> Parsed<'_, Number> {
     let mut rest = input;
     let mut value: u64 = 0;
@@ -140,7 +143,7 @@ fn number(input: Input<'_>, base32: bool, reencoded: bool) -> Parsed<'_, Number>
             }
             (Kind::Digit, false) if byte >= 191 => (byte - 191, true),
             (Kind::Digit, false) => (byte - 63, false),
-            // The eighth bit is lost on the lines that base 32 is for.
+            // Base 32 is for serial lines that drop the eighth bit.
             (Kind::Digit, true) if byte & 0x7f >= 95 => ((byte & 0x7f) - 95, true),
             (Kind::Digit, true) => ((byte & 0x7f) - 63, false),
             (Kind::End, _) if byte == 0x1b => {
@@ -282,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn fractions_divide() {
+    fn encoded_fractions() {
         // `>` 8 bits (16 = 8 << 1), then 400 * 256.
         let encoded = (400_u32 * 256) << 1;
         let digits =
@@ -293,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn flags_may_follow_line_ends() {
+    fn encoded_flag_after_line_end() {
         // gnuplot ends a line after each pair; the flag after it once went unseen.
         assert_eq!(
             items(b"\xbf\xbf\n<\xbf\xbf"),
@@ -308,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_terminator_gives_the_next_command_back() {
+    fn encoded_data_without_terminator() {
         let bytes = [95, 203, 191, b'P', b'U', b';'];
         assert_eq!(data_length(&bytes), 3);
         let bytes = [95, 203, 191, b'P', b'D', b'4', b'0'];

@@ -1,4 +1,5 @@
-//! Escape sequences: device control of plotters, PCL and RTL, and the ways between them and HP-GL/2.
+//! Escape sequences: device control of plotters, PCL and RTL, and the ways between them and
+//! HP-GL/2.
 
 use nom::Parser as _;
 use nom::branch::alt;
@@ -28,7 +29,8 @@ pub(crate) enum Escape {
     Unknown,
 }
 
-/// `escape = device-control | end-of-job | mode | reset | pcl | unknown`, with all binary data that it announces.
+/// `escape = device-control | end-of-job | mode | reset | pcl | unknown`, with all binary data that
+/// it announces.
 ///
 /// `unknown = ESC [ "0" to "~" ]`
 pub(crate) fn escape(input: Input<'_>) -> Parsed<'_, Escape> {
@@ -49,8 +51,8 @@ pub(crate) struct DeviceControl {
 
 /// `device-control = ESC "." ( letter { digit | ";" | "," | SP | "-" } [ ":" ] | byte )`
 ///
-/// Parameters are whole numbers between semicolons and end at a colon. Any other byte ends them too: a missing colon
-/// must not swallow the plot.
+/// Parameters are whole numbers between semicolons and end at a colon. Any other byte ends them
+/// too: a missing colon must not swallow the plot.
 pub(crate) fn device_control(input: Input<'_>) -> Parsed<'_, DeviceControl> {
     let parameters = take_while(|b: u8| b.is_ascii_digit() || matches!(b, b';' | b',' | b' ' | b'-'));
     let with_parameters = preceded((one_of("@HIMNPSTQhimnpstq"), parameters), opt(char(':')));
@@ -88,10 +90,11 @@ pub(crate) struct Pcl {
     pub(crate) frame: (Option<f64>, Option<f64>),
 }
 
-/// `pcl = family [ group ] { field }`, up to a field that ends in a capital letter, then its binary data.
+/// `pcl = family [ group ] { field }`, up to a field that ends in a capital letter, then its binary
+/// data.
 ///
-/// `family = "!" to "/" - "."`, `group = "`" to "~"`. Binary data inside a sequence are skipped as well; a damaged
-/// sequence ends after its last whole field.
+/// `family = "!" to "/" - "."`, `group = "`" to "~"`. Binary data inside a sequence are skipped as
+/// well; a damaged sequence ends after its last whole field.
 fn pcl(input: Input<'_>) -> Parsed<'_, Pcl> {
     let family = satisfy(|c| ('!'..='/').contains(&c) && c != '.');
     let group = opt(satisfy(|c| ('`'..='~').contains(&c)));
@@ -123,7 +126,8 @@ fn field(input: Input<'_>) -> Parsed<'_, (f64, u8)> {
     pair(map(opt(number), Option::unwrap_or_default), letter).parse(input)
 }
 
-/// `number = [ "+" | "-" ] ( digit | "." ) { digit | "." }`; what is no number with that many points is 0.
+/// `number = [ "+" | "-" ] ( digit | "." ) { digit | "." }`; what is no number with that many
+/// points is 0.
 fn number(input: Input<'_>) -> Parsed<'_, f64> {
     let digits = take_while1(|b: u8| b.is_ascii_digit() || b == b'.');
     map(recognize((opt(one_of("+-")), digits)), |text: &[u8]| {
@@ -132,7 +136,8 @@ fn number(input: Input<'_>) -> Parsed<'_, f64> {
     .parse(input)
 }
 
-/// `text = { byte - ESC }`, at least one byte of the file left: what a printer sets in its own fonts.
+/// `text = { byte - ESC }`, at least one byte of the file left: what a printer sets in its own
+/// fonts.
 pub(crate) fn text(input: Input<'_>) -> Parsed<'_, Input<'_>> {
     preceded(not(eof), take_while(|b| b != 0x1b)).parse(input)
 }

@@ -7,7 +7,8 @@ use nom::sequence::preceded;
 
 use super::{Input, Parsed};
 
-/// `job-line = "@PJL" { byte - LF - ESC } { CR | LF }`, in any case; the value is the language that it enters, if it does.
+/// `job-line = "@PJL" { byte - LF - ESC } { CR | LF }`, in any case; the value is the language that
+/// it enters, if it does.
 pub(crate) fn job_line(input: Input<'_>) -> Parsed<'_, Option<Input<'_>>> {
     let text = take_while(|b| b != b'\n' && b != 0x1b);
     let (rest, text) = preceded(tag_no_case("@PJL"), text).parse(input)?;
@@ -16,7 +17,8 @@ pub(crate) fn job_line(input: Input<'_>) -> Parsed<'_, Option<Input<'_>>> {
     Ok((rest, language))
 }
 
-/// `enter-language = { SP } "ENTER" { SP } "LANGUAGE" { SP | "=" } { byte - white-space }`, in any case.
+/// `enter-language = { SP } "ENTER" { SP } "LANGUAGE" { SP | "=" } { byte - white-space }`, in any
+/// case.
 fn enter_language(input: Input<'_>) -> Parsed<'_, Input<'_>> {
     let blanks = || take_while(|b| b == b' ');
     let keywords = (blanks(), tag_no_case("ENTER"), blanks(), tag_no_case("LANGUAGE"));

@@ -1,4 +1,5 @@
-//! The grammar of HP-GL and HP-GL/2, as nom parsers: one production a function, its syntax in the doc comment.
+//! The grammar of HP-GL and HP-GL/2, as nom parsers: one production a function, its syntax in the
+//! doc comment.
 //!
 //! ```text
 //! file       = { gap | command | parameters | prose | escape | job-line | control | stray }
@@ -11,12 +12,12 @@
 //! job-line   = "@PJL" { byte } line-end                             (job)
 //! ```
 //!
-//! Notation: `{ x }` any number of times, `[ x ]` at most once, `x - y` x but not y. A production knows neither the
-//! parser's state nor diagnostics: which language the next byte is in, what ends a label, what to do about damage and
-//! what to report is decided in [`crate::parser`].
+//! Notation: `{ x }` any number of times, `[ x ]` at most once, `x - y` x but not y. A production
+//! knows neither the parser's state nor diagnostics: which language the next byte is in, what ends
+//! a label, what to do about damage and what to report is decided in [`crate::parser`].
 //!
-//! Two parsers are written by hand, as functions of nom's type, because files consist of what they read:
-//! [`number::plain`] and [`encoded::data`].
+//! Two parsers are written by hand, as functions of nom's type, because files consist of what they
+//! read: [`number::plain`] and [`encoded::data`].
 
 pub(crate) mod bytes;
 pub(crate) mod encoded;

@@ -1,4 +1,5 @@
-//! Names of commands: which there are, how their parameters are written, and what else letters can be.
+//! Names of commands: which there are, how their parameters are written, and what else letters can
+//! be.
 
 use nom::Parser as _;
 use nom::branch::alt;
@@ -89,8 +90,8 @@ fn known_name(input: Input<'_>) -> Parsed<'_, Form> {
 
 /// `parted-name = letter filler { filler } letter`, `filler = blank | line-end | control | ","`.
 ///
-/// GhostPDL lets blanks and control bytes pass between the letters of a name. `P PA0,0` is a stray letter before a
-/// command, not `PP`: a whole name at the second letter goes first.
+/// GhostPDL lets blanks and control bytes pass between the letters of a name. `P PA0,0` is a stray
+/// letter before a command, not `PP`: a whole name at the second letter goes first.
 pub(crate) fn parted_name(input: Input<'_>) -> Parsed<'_, (Mnemonic, Form)> {
     let filler =
         take_while1(|b| matches!(class(b), Class::Blank | Class::Control | Class::LineEnd | Class::Comma));
@@ -102,13 +103,14 @@ pub(crate) fn parted_name(input: Input<'_>) -> Parsed<'_, (Mnemonic, Form)> {
     .parse(input)
 }
 
-/// `word = letter { letter }`. More than 64 letters are two words, so that a long run is not looked at again and again.
+/// `word = letter { letter }`. More than 64 letters are two words, so that a long run is not looked
+/// at again and again.
 pub(crate) fn word(input: Input<'_>) -> Parsed<'_, Input<'_>> {
     take_while_m_n(1, 64, |b| class(b) == Class::Letter).parse(input)
 }
 
-/// `run-on = { name } ( end | name-with-text )`: letters that read as names of commands only. What follows a name that
-/// takes text is the command's own.
+/// `run-on = { name } ( end | name-with-text )`: letters that read as names of commands only. What
+/// follows a name that takes text is the command's own.
 fn run_on(word: Input<'_>) -> Parsed<'_, ()> {
     let with_numbers = verify(known_name, |&form| form == Form::Numbers);
     preceded(many0_count(with_numbers), alt((value((), eof), value((), known_name)))).parse(word)
@@ -124,11 +126,11 @@ pub(crate) fn prose(input: Input<'_>) -> Parsed<'_, Input<'_>> {
         .parse(input)
 }
 
-/// `stray-letters = letter [ letter ]` before a `run-on` that is used as commands are: a stray letter before a command
-/// (`ZPD1,2`), or an unknown command without terminator (`ZQPD1,2`).
+/// `stray-letters = letter [ letter ]` before a `run-on` that is used as commands are: a stray
+/// letter before a command (`ZPD1,2`), or an unknown command without terminator (`ZQPD1,2`).
 ///
-/// The rest of the word counts as commands only if it reads as such to its end and parameters or a terminator follow:
-/// otherwise words like TEXT would draw.
+/// The rest of the word counts as commands only if it reads as such to its end and parameters or a
+/// terminator follow: otherwise words like TEXT would draw.
 pub(crate) fn stray_letters(input: Input<'_>) -> Parsed<'_, Input<'_>> {
     let (after, word) = word(input)?;
     let blanks = take_while(|b| class(b) == Class::Blank);

@@ -17,8 +17,9 @@ const EXACT_DIGITS: usize = 15;
 const POWERS_OF_TEN: [f64; EXACT_DIGITS + 1] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// `plain = [ "+" | "-" ] digit { digit } [ "." { digit } ]` or with digits after the point only; up to 15 digits, in
-/// range, and after them (not read) `","`, `";"`, SP, or a letter that begins no exponent.
+/// `plain = [ "+" | "-" ] digit { digit } [ "." { digit } ]` or with digits after the point only;
+/// up to 15 digits, in range, and after them (not read) `","`, `";"`, SP, or a letter that begins
+/// no exponent.
 ///
 /// The hot loop of the crate. What it does not match is read by [`unusual`].
 #[inline]
@@ -76,12 +77,13 @@ pub(crate) enum LineEnds {
 pub(crate) struct Unusual {
     /// Its value; `None` where a sign or a point stands alone.
     pub(crate) value: Option<f64>,
-    /// How many line ends stand between its digits; where they part numbers, 1 if a digit follows after one.
+    /// How many line ends stand between its digits; where they part numbers, 1 if a digit follows
+    /// after one.
     pub(crate) line_ends: usize,
 }
 
-/// `filler = { control | line-end | device-control }`: what may stand between the digits of a number. The value is
-/// whether there is a line end in it.
+/// `filler = { control | line-end | device-control }`: what may stand between the digits of a
+/// number. The value is whether there is a line end in it.
 fn filler(input: Input<'_>) -> Parsed<'_, bool> {
     let control = value(false, take_while1(|b| class(b) == Class::Control));
     let line_end = value(true, take_while1(|b| class(b) == Class::LineEnd));
@@ -89,11 +91,11 @@ fn filler(input: Input<'_>) -> Parsed<'_, bool> {
     fold_many0(kind, || false, |any, line_end| any | line_end).parse(input)
 }
 
-/// `unusual = [ "+" | "-" ] { filler ( digit | point ) } [ filler "E" [ "+" | "-" ] digit { filler digit } ]`, at most
-/// one point; `input` begins with a digit, a sign or a point.
+/// `unusual = [ "+" | "-" ] { filler ( digit | point ) } [ filler "E" [ "+" | "-" ] digit { filler digit } ]`,
+/// at most one point; `input` begins with a digit, a sign or a point.
 ///
-/// An exponent is read where a digit follows the `E`, with or without a sign: no name of a command has a digit in it,
-/// so that nothing else can be meant.
+/// An exponent is read where a digit follows the `E`, with or without a sign: no name of a command
+/// has a digit in it, so that nothing else can be meant.
 pub(crate) fn unusual(input: Input<'_>, meaning: LineEnds) -> Parsed<'_, Unusual> {
     // More digits than these change no f64.
     const LONGEST: usize = 40;
@@ -142,7 +144,8 @@ pub(crate) fn unusual(input: Input<'_>, meaning: LineEnds) -> Parsed<'_, Unusual
         rest = after;
     }
     let value = double::<_, nom::error::Error<&[u8]>>.parse(&text[..]).ok().map(|(_, value)| value);
-    // 40 digits and more before the point are out of range anyway: all that matters is that they stay so.
+    // 40 digits and more before the point are out of range anyway: all that matters is that they
+    // stay so.
     let value = value.map(|value| if dropped { f64::INFINITY } else { value }).filter(|_| digits > 0);
     Ok((rest, Unusual { value, line_ends }))
 }

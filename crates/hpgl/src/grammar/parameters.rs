@@ -28,7 +28,8 @@ pub(crate) enum Part {
     Stray,
 }
 
-/// `part = number | "," | gap | control | device-control | quoted | stray`; nothing else belongs to a list.
+/// `part = number | "," | gap | control | device-control | quoted | stray`; nothing else belongs to
+/// a list.
 pub(crate) fn part(input: Input<'_>, meaning: LineEnds) -> Parsed<'_, Part> {
     let gap = take_while1(|b| matches!(class(b), Class::Blank | Class::LineEnd));
     let number = |input| number(input, meaning);

@@ -1,4 +1,5 @@
-//! Commands whose parameters are not numbers: `LB BL WD DT SM CO`. Where their text ends is the whole question.
+//! Commands whose parameters are not numbers: `LB BL WD DT SM CO`. Where their text ends is the
+//! whole question.
 
 use nom::Parser as _;
 use nom::branch::alt;
@@ -30,9 +31,10 @@ pub(crate) enum LabelEnd {
 
 /// `label = { byte - terminator }`, and what ends it.
 ///
-/// A label without terminator must not swallow the rest of the file. Where none follows (`terminated` is false), it
-/// ends at the next semicolon, or at a line end before a [`pen_command`]. Where one follows, but a pen command reads
-/// plainly after a semicolon before it, it ends at that semicolon.
+/// A label without terminator must not swallow the rest of the file. Where none follows
+/// (`terminated` is false), it ends at the next semicolon, or at a line end before a
+/// [`pen_command`]. Where one follows, but a pen command reads plainly after a semicolon before it,
+/// it ends at that semicolon.
 pub(crate) fn label(input: Input<'_>, terminator: u8, terminated: bool) -> Parsed<'_, (Input<'_>, LabelEnd)> {
     let mut at = 0;
     let end = loop {
@@ -49,7 +51,8 @@ pub(crate) fn label(input: Input<'_>, terminator: u8, terminated: bool) -> Parse
     Ok((&input[at..], (&input[..at], end)))
 }
 
-/// `pen-command = ( "PU" | "PD" | "PA" | "PR" | "SP" ) ( number | ";" | ":" | end )` with blanks and line ends between.
+/// `pen-command = ( "PU" | "PD" | "PA" | "PR" | "SP" ) ( number | ";" | ":" | end )` with blanks
+/// and line ends between.
 fn pen_command(input: Input<'_>) -> Parsed<'_, Input<'_>> {
     let space = || take_while(|b: u8| b.is_ascii_whitespace());
     let name = alt((tag("PU"), tag("PD"), tag("PA"), tag("PR"), tag("SP")));
@@ -100,8 +103,8 @@ pub(crate) struct Comment<'a> {
     pub(crate) open_quote: Option<Input<'a>>,
 }
 
-/// `comment = { SP } [ quoted | '"' ] { byte - ";" - ESC }`, up to a letter right after a quote: a comment that is closed
-/// may have no semicolon after it.
+/// `comment = { SP } [ quoted | '"' ] { byte - ";" - ESC }`, up to a letter right after a quote: a
+/// comment that is closed may have no semicolon after it.
 pub(crate) fn comment(input: Input<'_>) -> Parsed<'_, Comment<'_>> {
     let (rest, _) = take_while(|b| b == b' ').parse(input)?;
     let (rest, closed) = opt(quoted).parse(rest)?;

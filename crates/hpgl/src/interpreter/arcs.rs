@@ -1,5 +1,5 @@
-//! Arcs, circles, wedges, rectangles and curves. Their mathematics is done in current units, where a circle is a
-//! circle whatever the scale does to it afterwards.
+//! Arcs, circles, wedges, rectangles and curves. Their mathematics is done in current units, where
+//! a circle is a circle whatever the scale does to it afterwards.
 
 use drawing::{CubicBez, EllipticArc, Line, Point, Segment, Vec2};
 
@@ -9,7 +9,8 @@ use crate::codes;
 /// The chord angle of arcs that name none, degrees.
 const DEFAULT_CHORD: f64 = 5.0;
 
-/// Chords of less than this (degrees) are a slip: on the largest sheet they would be shorter than a plotter unit.
+/// Chords of less than this (degrees) are a slip: on the largest sheet they would be shorter than a
+/// plotter unit.
 const LEAST_CHORD: f64 = 1e-3;
 
 /// Sine and cosine of an angle in degrees, exact at multiples of 90.
@@ -65,8 +66,8 @@ fn arc(center: Point, from: Point, sweep: f64, chord: Option<f64>) -> Vec<Segmen
     }
 }
 
-/// The centre of the circle through three points, and the sweep in degrees from the first over the second to the
-/// third; nothing where they lie on a line.
+/// The centre of the circle through three points, and the sweep in degrees from the first over the
+/// second to the third; nothing where they lie on a line.
 fn circle_through(a: Point, b: Point, c: Point) -> Option<(Point, f64)> {
     let (u, v) = (b - a, c - a);
     let cross = u.cross(v);
@@ -92,9 +93,9 @@ fn circle_through(a: Point, b: Point, c: Point) -> Option<(Point, f64)> {
 impl Interpreter {
     /// The chord angle in degrees to draw an arc with, or nothing where it is to be smooth.
     ///
-    /// Plotters draw arcs in chords of 5 degrees by default because they have to, not because anybody wants to see
-    /// them: such arcs are smooth here. A chord angle above that is a drawing instruction (CI with 120 is the usual
-    /// way to draw a triangle) and is kept.
+    /// Plotters draw arcs in chords of 5 degrees by default because they have to, not because
+    /// anybody wants to see them: such arcs are smooth here. A chord angle above that is a drawing
+    /// instruction (CI with 120 is the usual way to draw a triangle) and is kept.
     fn chord(&mut self, parameter: Option<f64>, radius: f64) -> Option<f64> {
         let parameter = parameter?.abs();
         let degrees = if self.chords_by_deviation {
@@ -114,7 +115,8 @@ impl Interpreter {
         (degrees > DEFAULT_CHORD).then_some(degrees)
     }
 
-    /// Draws, or keeps for the polygon, a path in current units that begins at the pen and leaves it at its end.
+    /// Draws, or keeps for the polygon, a path in current units that begins at the pen and leaves
+    /// it at its end.
     fn follow(&mut self, path: &[Segment]) {
         let Some(last) = path.last() else { return };
         let end = self.frame.plu_of_user(last.end());
@@ -132,7 +134,7 @@ impl Interpreter {
                 self.tracer.segment(&segment.transformed(map));
             }
         }
-        self.place(end);
+        self.set_pen_position(end);
     }
 
     fn is_sane_path(&mut self, path: &[Segment]) -> bool {
@@ -150,7 +152,7 @@ impl Interpreter {
         match *p {
             [x, y, sweep] => self.arc_about(Point::new(x, y), sweep, None),
             [x, y, sweep, chord, ..] => self.arc_about(Point::new(x, y), sweep, Some(chord)),
-            _ => self.lost("a centre and an angle"),
+            _ => self.report_dropped("a centre and an angle"),
         }
     }
 
@@ -158,7 +160,7 @@ impl Interpreter {
         match *p {
             [dx, dy, sweep] => self.arc_about(self.user_offset(dx, dy), sweep, None),
             [dx, dy, sweep, chord, ..] => self.arc_about(self.user_offset(dx, dy), sweep, Some(chord)),
-            _ => self.lost("a centre and an angle"),
+            _ => self.report_dropped("a centre and an angle"),
         }
     }
 
@@ -187,7 +189,7 @@ impl Interpreter {
             [xi, yi, xe, ye, chord, ..] => {
                 self.arc_through(Point::new(xi, yi), Point::new(xe, ye), Some(chord));
             }
-            _ => self.lost("two points"),
+            _ => self.report_dropped("two points"),
         }
     }
 
@@ -199,13 +201,14 @@ impl Interpreter {
             [dxi, dyi, dxe, dye, chord, ..] => {
                 self.arc_through(self.user_offset(dxi, dyi), self.user_offset(dxe, dye), Some(chord));
             }
-            _ => self.lost("two points"),
+            _ => self.report_dropped("two points"),
         }
     }
 
-    /// An arc through the pen's place, `inter` and `end`. Where there is none, what GhostPDL draws: all equal, a dot;
-    /// start equal to end, the circle with the diameter to `inter`; two others equal, or all on a line with `inter`
-    /// between, a line; `inter` beyond the end or before the start, the line to it and back to the end.
+    /// An arc through the pen position, `inter` and `end`. Where there is none, what GhostPDL
+    /// draws: all equal, a dot; start equal to end, the circle with the diameter to `inter`; two
+    /// others equal, or all on a line with `inter` between, a line; `inter` beyond the end or
+    /// before the start, the line to it and back to the end.
     fn arc_through(&mut self, inter: Point, end: Point, chord: Option<f64>) {
         let start = self.user_position();
         let line = |from, to| Segment::Line(Line::new(from, to));
@@ -235,7 +238,7 @@ impl Interpreter {
             self.follow(&path);
             let end = self.frame.plu_of_user(end);
             if self.is_sane(end) {
-                self.place(end);
+                self.set_pen_position(end);
             }
         } else {
             none(self);
@@ -256,15 +259,16 @@ impl Interpreter {
         self.beziers(p, true);
     }
 
-    /// Cubic curves from the pen on, each by three points; relative ones count all three from where the curve begins.
+    /// Cubic curves from the pen on, each by three points; relative ones count all three from where
+    /// the curve begins.
     fn beziers(&mut self, p: &[f64], relative: bool) {
         let curves = p.chunks_exact(6);
         if p.len() < 6 {
-            self.lost("three points a curve");
+            self.report_dropped("three points a curve");
             return;
         }
         if !curves.remainder().is_empty() {
-            self.report(codes::ODD_COORDINATES, || "points that make no whole curve are passed over".into());
+            self.report(codes::ODD_COORDINATES, || "points that make no whole curve are skipped".into());
         }
         for curve in curves {
             let from = self.user_position();
@@ -288,10 +292,11 @@ impl Interpreter {
         self.polygon.set(&outline);
     }
 
-    /// `CI`: a circle about the pen, drawn whether it is up or down. A negative radius begins at the other side.
+    /// `CI`: a circle about the pen, drawn whether it is up or down. A negative radius begins at
+    /// the other side.
     pub(super) fn circle(&mut self, p: &[f64]) {
         let Some(&radius) = p.first() else {
-            self.lost("a radius");
+            self.report_dropped("a radius");
             return;
         };
         let center = self.user_position();
@@ -327,7 +332,7 @@ impl Interpreter {
             [x, y, ..] if relative => self.user_offset(x, y),
             [x, y, ..] => Point::new(x, y),
             _ => {
-                self.lost("a corner");
+                self.report_dropped("a corner");
                 return None;
             }
         };
@@ -384,10 +389,11 @@ impl Interpreter {
         self.fill_rectangle(corner);
     }
 
-    /// The outline of a wedge about the pen: radius, start angle, sweep. A whole turn is a circle without radii.
+    /// The outline of a wedge about the pen: radius, start angle, sweep. A whole turn is a circle
+    /// without radii.
     fn wedge(&mut self, p: &[f64]) -> Option<Vec<Segment>> {
         let [radius, start, sweep, ref rest @ ..] = *p else {
-            self.lost("a radius and two angles");
+            self.report_dropped("a radius and two angles");
             return None;
         };
         if !self.leaves_polygons_alone() || radius == 0.0 || sweep == 0.0 {

@@ -6,8 +6,8 @@ use super::Interpreter;
 use crate::codes;
 use crate::fonts::CharacterSet;
 
-/// Character size where none is set: width and height of a capital, cm. The 7475A's on A4 paper; HP-GL/2's stick font of 9
-/// characters an inch and 11.5 points agrees within 0.5 %.
+/// Character size where none is set: width and height of a capital, cm. The 7475A's on A4 paper;
+/// HP-GL/2's stick font of 9 characters an inch and 11.5 points agrees within 0.5 %.
 const DEFAULT_SIZE_CM: (f64, f64) = (0.1879, 0.269);
 /// `SR` without parameters: percent of P2 - P1.
 const DEFAULT_SIZE_PERCENT: (f64, f64) = (0.75, 1.5);
@@ -89,7 +89,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// The place of a point given in widths and heights.
+    /// The offset of a point given in widths and heights.
     pub(super) fn at(&self, origin: Point, x: f64, y: f64) -> Point {
         origin + x * self.right + y * (self.up + self.lean)
     }
@@ -201,7 +201,8 @@ impl Interpreter {
         }
     }
 
-    /// `SD` and `AD`: pairs of a kind and its value. Kind 1 is the symbol set, 2 the spacing, 4 the height in points.
+    /// `SD` and `AD`: pairs of a kind and its value. Kind 1 is the symbol set, 2 the spacing, 4 the
+    /// height in points.
     pub(super) fn font_definition(&mut self, p: &[f64], alternate: bool) {
         for pair in p.chunks_exact(2) {
             let font = if alternate { &mut self.characters.alternate } else { &mut self.characters.standard };

@@ -1,15 +1,15 @@
 //! Fills: `FT AC PT`, and the hatch lines that stand for them.
 //!
-//! A pen fills an area by lines: solid fills as close as the pen is thick, hatches as `FT` says, shades by the share of
-//! paper that they cover. Lines lie on a grid through the anchor corner, so that neighbouring areas match, are cut at the
-//! area's edges, and are drawn to and fro.
+//! A pen fills an area by lines: solid fills as close as the pen is thick, hatches as set by `FT`,
+//! shades by the share of paper that they cover. Lines lie on a grid through the anchor corner, so
+//! that neighbouring areas match, are cut at the area's edges, and are drawn to and fro.
 
 use drawing::{Affine, FillRule, HatchGrid, HatchLine, Point, Vec2};
 
 use super::Interpreter;
 use crate::codes;
 
-/// Thickness of a pen that no `PT` or `PW` tells, mm.
+/// Pen thickness without `PT` or `PW`, mm.
 const DEFAULT_PEN_MM: f64 = 0.3;
 /// Shares of paper that raster fills and patterns of printers are taken for.
 const RASTER_SHARE: f64 = 0.25;
@@ -18,7 +18,8 @@ const RASTER_SHARE: f64 = 0.25;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FillType {
     number: i32,
-    /// Spacing in current units and angle in degrees of types 3 and 4; a spacing of nothing is 1 % of the diagonal.
+    /// Spacing in current units and angle in degrees of types 3 and 4; a spacing of nothing is 1 %
+    /// of the diagonal.
     hatch: [(Option<f64>, f64); 2],
     /// Percent of type 10.
     shade: f64,

@@ -4,7 +4,7 @@
 //! user units --SC, P1, P2--> plotter units --RO, unit--> mm
 //! ```
 //!
-//! The pen's place is kept in plotter units, which neither SC nor IP moves.
+//! The pen position is kept in plotter units, which neither SC nor IP moves.
 
 use drawing::{Affine, Point, Rect, Vec2};
 
@@ -16,7 +16,8 @@ use crate::summary::{Profile, ProfileReason};
 pub(crate) enum Scale {
     /// Both scaling points have the given user coordinates.
     Anisotropic { x: (f64, f64), y: (f64, f64) },
-    /// As large as fits with equal units; what is left over of the area is put `left` and `bottom` percent before it.
+    /// As large as fits with equal units; what is left over of the area is put `left` and `bottom`
+    /// percent before it.
     Isotropic { x: (f64, f64), y: (f64, f64), left: f64, bottom: f64 },
     /// P1 has the given user coordinates, and a user unit that many plotter units.
     PointFactor { origin: (f64, f64), factor: (f64, f64) },
@@ -67,7 +68,7 @@ impl AxisMap {
     const IDENTITY: Self = Self { factor: Vec2::new(1.0, 1.0), shift: Vec2::ZERO };
 }
 
-/// All that maps what the file says to the page.
+/// The map from coordinates of the file to the page.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
     unit_mm: f64,
@@ -122,7 +123,8 @@ impl Frame {
         frame
     }
 
-    /// What `IN` does: no rotation, no scale, no window, the default scaling points. The page stays.
+    /// What `IN` does: no rotation, no scale, no window, the default scaling points. The page
+    /// stays.
     pub(crate) fn initialise(&mut self) {
         self.rotation = Rotation::R0;
         self.scale = None;
@@ -246,8 +248,8 @@ impl Frame {
         if self.rotation.swaps() { Rect::new(rect.y0, rect.x0, rect.y1, rect.x1) } else { rect }
     }
 
-    /// Sets the scale. The pen stays where it is; a window given in user units turns to plotter units when the scale
-    /// is taken away.
+    /// Sets the scale. The pen stays where it is; a window given in user units turns to plotter
+    /// units when the scale is taken away.
     pub(crate) fn set_scale(&mut self, scale: Option<Scale>) {
         if scale.is_none()
             && let Some(window) = &mut self.window
@@ -258,7 +260,7 @@ impl Frame {
         self.update();
     }
 
-    /// Sets P1 and P2, and says whether they had to be moved apart.
+    /// Sets P1 and P2; true if they had to be moved apart.
     pub(crate) fn set_points(&mut self, p1: Point, p2: Point) -> bool {
         self.points_assumed = false;
         let meet = (p1.x == p2.x, p1.y == p2.y);
@@ -268,7 +270,8 @@ impl Frame {
         meet.0 || meet.1
     }
 
-    /// The default P1 and P2 of the current rotation: corners of the page where the file set one, else the plotter's.
+    /// The default P1 and P2 of the current rotation: corners of the page where the file set one,
+    /// else the plotter's.
     pub(crate) fn reset_points(&mut self) {
         self.points_assumed = !self.page_set;
         let (p1, p2) = if self.page_set {
@@ -293,16 +296,18 @@ impl Frame {
         self.update();
     }
 
-    /// Turns the frame. P1 and P2 keep their numbers; the result is where a point of the old frame lies in the new one.
+    /// Turns the frame. P1 and P2 keep their numbers; the result is where a point of the old frame
+    /// lies in the new one.
     pub(crate) fn rotate(&mut self, rotation: Rotation, pen: Point) -> Point {
-        let place = self.turn * pen;
+        let position = self.turn * pen;
         self.rotation = rotation;
         self.update();
-        self.turn.inverse() * place
+        self.turn.inverse() * position
     }
 
-    /// Sets the page, from the origin: x runs along its longer side, whichever of the two numbers that is. P1 and P2
-    /// become its corners. A page of one length is a square that is open towards y.
+    /// Sets the page, from the origin: x runs along its longer side, whichever of the two numbers
+    /// that is. P1 and P2 become its corners. A page of one length is a square that is open towards
+    /// y.
     pub(crate) fn set_page(&mut self, length: f64, width: Option<f64>) {
         let (length, width) = match width {
             Some(width) => (length.max(width), Some(length.min(width))),
@@ -320,7 +325,8 @@ impl Frame {
         self.reset_points();
     }
 
-    /// Takes paper of a plotter, if the file may choose: the default P1 and P2, and the area that the pen reaches.
+    /// Takes paper of a plotter, if the file may choose: the default P1 and P2, and the area that
+    /// the pen reaches.
     pub(crate) fn set_paper(&mut self, paper: &Paper) {
         if !self.automatic {
             return;

@@ -7,9 +7,11 @@ use super::characters::{CELL, Shape};
 use crate::codes;
 use crate::fonts::{BODY_WIDTH, CAP_HEIGHT, Glyph};
 
-/// The grid that `UC` draws on: units in a character's width and height. A cell has 6 by 16 of them.
+/// The grid that `UC` draws on: units in a character's width and height. A cell has 6 by 16 of
+/// them.
 const GRID: Vec2 = Vec2::new(4.0, 8.0);
-/// Pen control of `UC`: numbers from here on put the pen down, below the negative of it they lift it.
+/// Pen control of `UC`: numbers from here on put the pen down, below the negative of it they lift
+/// it.
 const PEN_CONTROL: f64 = 99.0;
 /// Cells from one tabulator to the next.
 const TABULATOR: f64 = 8.0;
@@ -28,7 +30,7 @@ impl Interpreter {
             return;
         }
         if self.label_end != Some(self.position) {
-            // The pen has moved since the last label: the place it moved to is the margin.
+            // The pen has moved since the last label: its new position is the margin.
             self.margin = self.position;
         }
         self.ink();
@@ -38,14 +40,15 @@ impl Interpreter {
         // Each piece between carriage returns has its own justification.
         for (index, line) in letters.split(|letter| letter.character == '\r').enumerate() {
             if index > 0 {
-                self.place(self.margin);
+                self.set_pen_position(self.margin);
             }
             self.line_of_text(line, &shape);
         }
         self.label_end = Some(self.position);
     }
 
-    /// The characters that bytes stand for in the font at work. Labels that are UTF-8 are read as such.
+    /// The characters that bytes stand for in the font at work. Labels that are UTF-8 are read as
+    /// such.
     fn letters(&mut self, text: &[u8], start: usize) -> Vec<Letter> {
         if !text.is_ascii()
             && let Ok(text) = std::str::from_utf8(text)
@@ -119,15 +122,15 @@ impl Interpreter {
 
     /// Where a line of text begins so that it is justified about the pen.
     ///
-    /// Origins 1 to 9 count up the left side, the middle and the right side of the text from its base; 11 to 19 are the same
-    /// half a character away from it.
+    /// Origins 1 to 9 count up the left side, the middle and the right side of the text from its
+    /// base; 11 to 19 are the same half a character away from it.
     fn justification(&self, line: &[Letter], shape: &Shape) -> Vec2 {
         let origin = match self.characters.origin {
             21 => 1,
             origin => origin,
         };
-        let place = f64::from((origin % 10).clamp(1, 9) - 1);
-        let (column, row) = ((place / 3.0).floor(), place % 3.0);
+        let cell = f64::from((origin % 10).clamp(1, 9) - 1);
+        let (column, row) = ((cell / 3.0).floor(), cell % 3.0);
         let printing = || line.iter().filter(|letter| letter.character >= ' ');
         let last = printing().next_back().map_or(' ', |letter| letter.character);
         let (width, height) = match self.characters.path {
@@ -141,7 +144,8 @@ impl Interpreter {
                 (1.0, (printing().count() as f64 * pitch - (pitch - 1.0)).max(0.0))
             }
         };
-        // The text's box lies right of its first character's origin, or left of or below it, as the path goes.
+        // The text's box lies right of its first character's origin, or left of or below it, as the
+        // path goes.
         let (left, bottom) = match self.characters.path {
             2 => (1.0 - width, 0.0),
             1 => (0.0, 1.0 - height),
@@ -156,25 +160,25 @@ impl Interpreter {
 
     fn line_of_text(&mut self, line: &[Letter], shape: &Shape) {
         let shift = self.justification(line, shape);
-        self.place(self.position + shift);
+        self.set_pen_position(self.position + shift);
         for letter in line {
             match letter.character {
                 '\n' => {
                     let feed = self.feed_step(shape);
                     self.margin += feed;
-                    self.place(self.position + feed);
+                    self.set_pen_position(self.position + feed);
                 }
                 '\u{8}' => {
                     let step = self.advance_step(' ', shape);
-                    self.place(self.position - step);
+                    self.set_pen_position(self.position - step);
                 }
                 '\t' => self.tabulate(shape),
-                // Other control characters print nothing and take no room.
+                // Other control characters print nothing and do not advance.
                 '\0'..='\u{1f}' => {}
                 character => {
                     self.letter(*letter, shape);
                     let step = self.advance_step(character, shape);
-                    self.place(self.position + step);
+                    self.set_pen_position(self.position + step);
                 }
             }
         }
@@ -186,7 +190,7 @@ impl Interpreter {
         let come = (self.position - self.margin).dot(step) / step.hypot2();
         let next = ((come / TABULATOR + 1e-6).floor() + 1.0) * TABULATOR;
         if next.is_finite() {
-            self.place(self.position + (next - come) * step);
+            self.set_pen_position(self.position + (next - come) * step);
         }
     }
 
@@ -202,12 +206,13 @@ impl Interpreter {
             });
             return;
         };
-        // In cells of one width glyphs stand in the middle of their body; slanted rows and narrow letters stay apart.
+        // In cells of one width glyphs stand in the middle of their body; slanted rows and narrow
+        // letters stay apart.
         let shift = if self.is_proportional() { 0.0 } else { 0.5 * (BODY_WIDTH - glyph.advance) };
         self.glyph(glyph, shape, self.position, shift, 0.0);
     }
 
-    /// Draws a glyph with its origin at a place, moved by units of the font.
+    /// Draws a glyph with its origin at a position, offset in units of the font.
     fn glyph(&mut self, glyph: Glyph, shape: &Shape, origin: Point, shift_x: f64, shift_y: f64) {
         let dashes = self.tracer.swap_dashes(None);
         for stroke in glyph.strokes() {
@@ -264,7 +269,7 @@ impl Interpreter {
         };
         self.tracer.finish();
         if self.is_sane(to) {
-            self.place(to);
+            self.set_pen_position(to);
         }
         self.label_end = Some(self.position);
     }
@@ -293,8 +298,8 @@ impl Interpreter {
         self.glyph(glyph, &shape, self.position, -x, -y);
     }
 
-    /// `UC`: a character of the user's, as steps on a grid in its cell, with pen control between them. The pen begins up, and is
-    /// left one cell on.
+    /// `UC`: a character of the user's, as steps on a grid in its cell, with pen control between
+    /// them. The pen begins up, and is left one cell on.
     pub(super) fn user_character(&mut self, p: &[f64]) {
         if !self.leaves_polygons_alone() {
             return;
@@ -318,7 +323,7 @@ impl Interpreter {
             }
             let [dy, more @ ..] = more else {
                 self.report(codes::ODD_COORDINATES, || {
-                    "`UC` ends with an x without y, which is passed over".into()
+                    "`UC` ends with an x without y, which is skipped".into()
                 });
                 break;
             };
@@ -334,7 +339,7 @@ impl Interpreter {
         self.tracer.swap_dashes(dashes);
         let step = self.advance_step(' ', &shape);
         if self.is_sane(origin + step) {
-            self.place(origin + step);
+            self.set_pen_position(origin + step);
         }
         self.label_end = Some(self.position);
     }

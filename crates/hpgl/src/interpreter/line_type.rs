@@ -39,7 +39,7 @@ const NOTHING: f64 = 1e-9;
 enum Kind {
     /// Only the ends of each piece, as dots.
     Ends,
-    /// The pattern goes on over corners.
+    /// The pattern continues over corners.
     Fixed,
     /// Every piece has a whole number of patterns.
     Adaptive,
@@ -91,7 +91,8 @@ impl Dashes {
             ink(Dash::Dot(segment.end()));
             return;
         }
-        // Along lines and circular arcs length is in proportion to the parameter; other curves are taken as chords.
+        // Along lines and circular arcs length is in proportion to the parameter; other curves are
+        // taken as chords.
         let uniform = match segment {
             Segment::Line(_) => true,
             Segment::Arc(arc) => arc.circle_radius().is_some(),
@@ -165,7 +166,8 @@ pub(crate) struct LineType {
 const DEFAULT_LENGTH: f64 = 4.0;
 
 impl Interpreter {
-    /// `LT`: without a number solid lines; else the pattern, its length, and what that is measured in.
+    /// `LT`: without a number solid lines; else the pattern, its length, and what that is measured
+    /// in.
     pub(super) fn line_type(&mut self, p: &[f64]) {
         let line_type = &mut self.line_type;
         match *p {
@@ -174,8 +176,8 @@ impl Interpreter {
                 line_type.number = None;
             }
             [99.0, ..] => {
-                if let Some((number, place)) = line_type.previous
-                    && place == self.position
+                if let Some((number, position)) = line_type.previous
+                    && position == self.position
                 {
                     line_type.number = number;
                 }
@@ -197,7 +199,8 @@ impl Interpreter {
         self.apply_line_type();
     }
 
-    /// `UL`: a pattern of the user's. Without gaps the usual pattern, without anything all usual ones.
+    /// `UL`: a pattern of the user's. Without gaps the usual pattern, without anything all usual
+    /// ones.
     pub(super) fn user_line_type(&mut self, p: &[f64]) {
         match *p {
             [] => self.line_type.user = Default::default(),
@@ -212,7 +215,8 @@ impl Interpreter {
                 } else {
                     let mut parts: Vec<f64> = gaps.iter().map(|gap| gap / total).collect();
                     if parts.len() % 2 == 1 {
-                        // Stroke and gap change places each time round otherwise; as written, the last meets the first.
+                        // Stroke and gap change places each time round otherwise; as written, the
+                        // last meets the first.
                         parts.push(0.0);
                     }
                     *slot = Some(parts);
@@ -245,7 +249,7 @@ impl Interpreter {
         self.tracer.set_dashes(dashes);
     }
 
-    /// Tells where lines are drawn solid for want of any sense in so many dashes.
+    /// Reports lines that are drawn solid because their pattern has too many dashes.
     pub(super) fn report_given_up_dashes(&mut self) {
         if self.tracer.take_given_up() {
             self.report(codes::TOO_MANY_PIECES, || {
@@ -269,14 +273,14 @@ mod tests {
     }
 
     #[test]
-    fn the_pattern_goes_on_over_corners() {
+    fn pattern_continues_over_corners() {
         let mut dashes = Dashes::new(Kind::Fixed, FIXED[1], 4.0);
         assert_eq!(strokes(&mut dashes, 0.0, 5.0), [(0.0, 2.0), (4.0, 5.0)]);
         assert_eq!(strokes(&mut dashes, 5.0, 9.0), [(5.0, 6.0), (8.0, 9.0)]);
     }
 
     #[test]
-    fn adaptive_patterns_fit() {
+    fn adaptive_pattern_lengths() {
         let mut dashes = Dashes::new(Kind::Adaptive, ADAPTIVE[1], 4.0);
         assert_eq!(strokes(&mut dashes, 0.0, 9.0), [(0.0, 1.125), (3.375, 4.5), (4.5, 5.625), (7.875, 9.0)]);
     }

@@ -34,32 +34,33 @@ use polygon::Polygon;
 use ticks::Ticks;
 use tracer::Tracer;
 
-/// Gives the commands of a file their meaning.
+/// Interprets the commands of a file.
 pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Document {
     let mut interpreter = Interpreter::new(options, syntax.bytes.len());
     let mut findings = syntax.findings.clone();
     let mut placed = 0;
     for (command, found) in syntax.commands().zip(syntax.findings_until()) {
         if found > placed {
-            findings.place(placed, interpreter.pen_position());
+            findings.set_pen_position(placed, interpreter.pen_position());
             placed = found;
         }
         interpreter.execute(&command);
     }
-    findings.place(placed, interpreter.pen_position());
+    findings.set_pen_position(placed, interpreter.pen_position());
     interpreter.finish(syntax.command_count, syntax.hints.wrappers, findings)
 }
 
-/// How many hatch lines, and how many dashes, a file can come to: enough for a large sheet filled solid, and little enough to
-/// hold. A few bytes must not ask for more than a machine has.
-const PIECES_FOR_NOTHING: u64 = 200_000;
-const PIECES_A_BYTE: u64 = 4;
+/// Limit of hatch lines, and of dashes: this number plus [`SEGMENTS_PER_BYTE`] times the size of
+/// the file. Enough for a large sheet filled solid; without a limit a few bytes could exhaust
+/// memory.
+const BASE_SEGMENT_BUDGET: u64 = 200_000;
+const SEGMENTS_PER_BYTE: u64 = 4;
 
 /// Which pen the plotter holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Holder {
+enum PenSelection {
     /// No `SP` yet.
-    Unsaid,
+    Default,
     /// `SP0`.
     Empty,
     /// A pen.
@@ -69,14 +70,14 @@ enum Holder {
 /// The state of a plotter while it draws a file.
 pub(crate) struct Interpreter {
     frame: Frame,
-    holder: Holder,
+    pen_selection: PenSelection,
     down: bool,
     relative: bool,
     /// The parameter of `CT` is 1: chords are given by how far they leave their arc.
     chords_by_deviation: bool,
     /// Where the pen is, plotter units of the turned frame.
     position: Point,
-    /// The same place on the page, mm.
+    /// The same position on the page, mm.
     position_mm: Point,
     tracer: Tracer,
     polygon: Polygon,
@@ -109,12 +110,12 @@ pub(crate) struct Interpreter {
 impl Interpreter {
     /// A plotter for a file of that many bytes.
     pub(crate) fn new(options: &Options, length: usize) -> Self {
-        let pieces = PIECES_FOR_NOTHING + PIECES_A_BYTE * length as u64;
+        let pieces = BASE_SEGMENT_BUDGET + SEGMENTS_PER_BYTE * length as u64;
         let frame = Frame::new(options);
         let position_mm = frame.mm_of_plu(Point::ZERO);
         Self {
             frame,
-            holder: Holder::Unsaid,
+            pen_selection: PenSelection::Default,
             down: false,
             relative: false,
             chords_by_deviation: false,
@@ -147,7 +148,7 @@ impl Interpreter {
         self.position_mm
     }
 
-    /// Files a finding about the command at work.
+    /// Reports a finding about the command at work.
     fn report(&mut self, code: Code, message: impl FnOnce() -> String) {
         self.report_at(code, self.span, message);
     }
@@ -156,22 +157,21 @@ impl Interpreter {
         self.findings.report(code, self.mnemonic, span, self.number, self.position_mm, || (message(), None));
     }
 
-    /// Files a finding about a setting that the command at work cannot make.
+    /// Reports a finding about a setting that the command at work cannot make.
     fn bad_parameters(&mut self, expected: &str) {
         let mnemonic = self.mnemonic;
         self.report(codes::BAD_PARAMETERS, || format!("`{mnemonic}` takes {expected}; it has no effect"));
     }
 
-    /// Files a finding about ink that the command at work does not draw.
-    fn lost(&mut self, expected: &str) {
+    /// Reports a finding about ink that the command at work does not draw.
+    fn report_dropped(&mut self, expected: &str) {
         let mnemonic = self.mnemonic;
         self.report(codes::LOST_DRAWING_COMMAND, || {
             format!("`{mnemonic}` takes {expected}; it draws nothing")
         });
     }
 
-    /// Does what a command says.
-    #[expect(clippy::too_many_lines, reason = "one match arm per command")]
+    /// Executes a command.
     pub(crate) fn execute(&mut self, command: &Command<'_>) {
         let mnemonic = command.mnemonic;
         let goes_on = self.number == command.number;
@@ -183,8 +183,24 @@ impl Interpreter {
         if first >= b'A' && !goes_on {
             self.used[usize::from(first - b'A') * 26 + usize::from(second - b'A')] += 1;
         }
+        if !(self.draw(command) || self.write_text(command)) {
+            self.configure(command);
+        }
+        self.report_given_up_dashes();
+        for _ in 0..self.tracer.take_clipped() {
+            if self.frame.has_window() {
+                self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
+            } else {
+                self.report(codes::CUT_AT_PAGE, || "ink outside the page that PS sets is cut off".into());
+            }
+        }
+    }
+
+    /// Executes a command that moves the pen or draws; false if it is none.
+    #[inline]
+    fn draw(&mut self, command: &Command<'_>) -> bool {
         let p = command.parameters;
-        match &mnemonic.0 {
+        match &command.mnemonic.0 {
             b"PU" => self.pen_up(p),
             b"PD" => self.pen_down(p),
             b"PA" => self.plot_absolute(p),
@@ -203,37 +219,20 @@ impl Interpreter {
             b"RR" => self.fill_rectangle_relative(p),
             b"EW" => self.edge_wedge(p),
             b"WG" => self.fill_wedge(p),
-            b"CT" => self.chord_type(p),
             b"PM" => self.polygon_mode(p),
             b"EP" => self.edge_polygon(),
             b"FP" => self.fill_polygon(p),
-            b"FT" => self.fill_type(p),
-            b"AC" => self.anchor_corner(p),
-            b"PT" => self.pen_thickness(p),
-            b"LT" => self.line_type(p),
-            b"UL" => self.user_line_type(p),
-            b"TL" => self.tick_length(p),
             b"XT" => self.x_tick(),
             b"YT" => self.y_tick(),
-            b"VS" => self.pen_speed(p),
-            b"FS" => self.pen_force(p),
-            b"AS" => self.pen_acceleration(p),
-            b"PW" => self.pen_width(p),
-            b"WU" => self.width_unit(p),
-            b"PC" => self.pen_colour(p),
-            // They have no effect on ink but that line patterns begin anew.
-            b"LA" | b"RF" | b"TR" => self.apply_line_type(),
-            b"SP" => self.select_pen(p),
-            b"IN" => self.initialise(),
-            b"DF" => self.set_defaults(),
-            b"IP" => self.input_points(p),
-            b"IR" => self.input_points_relative(p),
-            b"SC" => self.scale(p),
-            b"RO" => self.rotate(p),
-            b"IW" => self.input_window(p),
-            b"PS" => self.page_size(p),
-            b"PG" | b"AF" | b"AH" | b"FR" => self.advance_page(),
-            b"BP" => self.begin_plot(),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Executes a command of labels and symbols; false if it is none.
+    fn write_text(&mut self, command: &Command<'_>) -> bool {
+        let p = command.parameters;
+        match &command.mnemonic.0 {
             b"LB" => self.label(command.text, command.text_span.start),
             b"BL" => self.buffer_label(command.text, command.text_span.start),
             b"PB" => self.print_buffer(),
@@ -254,6 +253,41 @@ impl Interpreter {
             b"AD" => self.font_definition(p, true),
             b"SS" => self.select_font(false),
             b"SA" => self.select_font(true),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Executes a command that changes a setting, or reports one that has no meaning in a file.
+    fn configure(&mut self, command: &Command<'_>) {
+        let (mnemonic, p) = (command.mnemonic, command.parameters);
+        match &mnemonic.0 {
+            b"CT" => self.chord_type(p),
+            b"FT" => self.fill_type(p),
+            b"AC" => self.anchor_corner(p),
+            b"PT" => self.pen_thickness(p),
+            b"LT" => self.line_type(p),
+            b"UL" => self.user_line_type(p),
+            b"TL" => self.tick_length(p),
+            b"VS" => self.pen_speed(p),
+            b"FS" => self.pen_force(p),
+            b"AS" => self.pen_acceleration(p),
+            b"PW" => self.pen_width(p),
+            b"WU" => self.width_unit(p),
+            b"PC" => self.pen_colour(p),
+            // They have no effect on ink but that line patterns begin anew.
+            b"LA" | b"RF" | b"TR" => self.apply_line_type(),
+            b"SP" => self.select_pen(p),
+            b"IN" => self.initialise(),
+            b"DF" => self.set_defaults(),
+            b"IP" => self.input_points(p),
+            b"IR" => self.input_points_relative(p),
+            b"SC" => self.scale(p),
+            b"RO" => self.rotate(p),
+            b"IW" => self.input_window(p),
+            b"PS" => self.page_size(p),
+            b"PG" | b"AF" | b"AH" | b"FR" => self.advance_page(),
+            b"BP" => self.begin_plot(),
             b"OA" | b"OC" | b"OD" | b"OE" | b"OF" | b"OG" | b"OH" | b"OI" | b"OK" | b"OL" | b"OO" | b"OP"
             | b"OS" | b"OT" | b"OW" | b"DP" | b"DC" => {
                 self.report(codes::OUTPUT_COMMAND, || format!("`{mnemonic}` has no meaning in a file"));
@@ -263,33 +297,26 @@ impl Interpreter {
             _ if mnemonic == Mnemonic::PICTURE_FRAME => self.picture_frame(p),
             _ => {}
         }
-        self.report_given_up_dashes();
-        for _ in 0..self.tracer.take_clipped() {
-            if self.frame.has_window() {
-                self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
-            } else {
-                self.report(codes::CUT_AT_PAGE, || "ink outside the page that PS sets is cut off".into());
-            }
-        }
     }
 
-    /// To be called before ink: sees to it that there is a pen, and tells where that is not what the file says.
+    /// Call before drawing: selects a pen if none is held, and reports that.
     #[inline]
     fn ink(&mut self) {
-        if !(matches!(self.holder, Holder::Holds(_)) && self.pens.are_noted()) {
+        if !(matches!(self.pen_selection, PenSelection::Holds(_)) && self.pens.are_noted()) {
             self.find_pen();
         }
     }
 
     fn find_pen(&mut self) {
-        match self.holder {
-            Holder::Holds(_) => {}
-            Holder::Unsaid => {
+        match self.pen_selection {
+            PenSelection::Holds(_) => {}
+            PenSelection::Default => {
                 self.report(codes::NO_PEN_SELECTED, || "no SP has selected a pen: pen 1 is taken".into());
                 self.hold(1);
             }
-            // Kept as ink of pen 0 until the end of the file tells whether there is any other.
-            Holder::Empty => {
+            // Kept as ink of pen 0 until the end of the file, when it is known whether there is any
+            // other.
+            PenSelection::Empty => {
                 self.report(codes::PEN_PUT_AWAY, || "the pen is put away (SP0): nothing is drawn".into());
             }
         }
@@ -297,18 +324,19 @@ impl Interpreter {
     }
 
     fn hold(&mut self, pen: u16) {
-        self.holder = if pen == 0 && !self.pens.zero_draws { Holder::Empty } else { Holder::Holds(pen) };
+        self.pen_selection =
+            if pen == 0 && !self.pens.zero_draws { PenSelection::Empty } else { PenSelection::Holds(pen) };
         self.tracer.set_pen(Pen(pen));
         self.pens.touch();
     }
 
-    /// Puts the pen at a place without drawing.
-    fn place(&mut self, position: Point) {
+    /// Sets the pen position without drawing.
+    fn set_pen_position(&mut self, position: Point) {
         self.position = position;
         self.position_mm = self.frame.mm_of_plu(position);
     }
 
-    /// Whether a point can be meant; if not, it is told.
+    /// Whether a point is in range; if not, it is reported.
     #[inline]
     fn is_sane(&mut self, position: Point) -> bool {
         let sane = position.x.abs() <= crate::units::SANE_PLU && position.y.abs() <= crate::units::SANE_PLU;
@@ -329,8 +357,8 @@ impl Interpreter {
         });
     }
 
-    /// Ink that was drawn after `SP0` is none, unless there is no other in the whole file: then a pen in the holder is
-    /// meant.
+    /// Ink that was drawn after `SP0` is none, unless there is no other in the whole file: then a
+    /// pen in the holder is meant.
     fn settle_ink_of_no_pen(&mut self) {
         if self.pens.zero_draws {
             self.number_pen_zero();

@@ -17,7 +17,7 @@ impl Interpreter {
         self.pages.push(Page { drawing: Drawing { strokes }, pens: self.pens.take_used() });
     }
 
-    /// `PG` and its like: a new sheet; coordinates go on.
+    /// `PG` and its like: a new sheet; coordinates continue.
     pub(super) fn advance_page(&mut self) {
         self.tracer.finish();
         self.down = false;
@@ -31,7 +31,7 @@ impl Interpreter {
         self.initialise();
     }
 
-    /// The file is HP-GL/2: P1 and P2 are the corners of the page unless told otherwise.
+    /// The file is HP-GL/2: P1 and P2 are the corners of the page unless `IP` sets them.
     pub(super) fn enter_hpgl2(&mut self) {
         self.frame.use_corners();
     }
@@ -44,7 +44,7 @@ impl Interpreter {
         self.initialise();
     }
 
-    /// Keeps on record what the file was read for, unless it is nothing that the file said.
+    /// Records the plotter profile, unless it is only assumed and one was recorded before.
     pub(super) fn note_profile(&mut self) {
         let now = self.frame.profile();
         if self.profile.is_none() || now.reason != ProfileReason::Assumed {
@@ -52,7 +52,7 @@ impl Interpreter {
         }
     }
 
-    /// Says so where there is more than one sheet.
+    /// Reports more than one sheet.
     pub(super) fn report_pages(&mut self) {
         let count = self.pages.len();
         if count > 1 {

@@ -1,8 +1,8 @@
-//! What the file says about its pens: `VS FS AS PW WU`.
+//! Pen settings: `VS FS AS PW PC WU`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Holder, Interpreter};
+use super::{Interpreter, PenSelection};
 use crate::codes;
 use crate::document::PenSettings;
 use drawing::Pen;
@@ -45,7 +45,7 @@ impl Pens {
         self.used
             .entry(pen)
             .and_modify(|before| {
-                // One speed a pen is what can be honoured: the gentlest that it was ever told.
+                // A plan has one speed per pen: the lowest that the file sets.
                 let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
                 *before = PenSettings {
                     speed_mm_s: least(before.speed_mm_s, now.speed_mm_s),
@@ -75,10 +75,10 @@ impl Pens {
 }
 
 impl Interpreter {
-    /// Notes what the pen that draws now was told.
+    /// Records the settings of the pen that draws now.
     pub(super) fn note_pen(&mut self) {
         if !self.pens.noted
-            && let Holder::Holds(pen) = self.holder
+            && let PenSelection::Holds(pen) = self.pen_selection
         {
             self.pens.note(Pen(pen));
         }
@@ -102,7 +102,7 @@ impl Interpreter {
         self.pens.set(p.get(1).copied(), |settings| settings.acceleration = acceleration);
     }
 
-    /// `PW`: width, in mm or as `WU` says.
+    /// `PW`: width, in mm or in the unit of `WU`.
     pub(super) fn pen_width(&mut self, p: &[f64]) {
         let (p1, p2) = self.frame.points();
         let unit = if self.pens.relative_widths {
@@ -115,14 +115,15 @@ impl Interpreter {
         self.apply_line_type();
     }
 
-    /// `PC`: a colour of the palette. Which one matters for pen 0 only, the colour of the paper unless it is told another.
+    /// `PC`: a colour of the palette. It matters for pen 0 only, whose colour is that of the paper
+    /// by default.
     pub(super) fn pen_colour(&mut self, p: &[f64]) {
         const WHITE: f64 = 255.0;
         if let [0.0, red, green, blue, ..] = *p
             && red.min(green).min(blue) < WHITE
         {
             self.pens.zero_draws = true;
-            if self.holder == Holder::Empty {
+            if self.pen_selection == PenSelection::Empty {
                 self.hold(0);
             }
         }

@@ -8,7 +8,8 @@ use crate::codes;
 /// One outline of a polygon, on the page in mm.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outline {
-    /// Its pieces, each with whether the pen was down: those with the pen up bound the area but are not edged.
+    /// Its pieces, each with whether the pen was down: those with the pen up bound the area but are
+    /// not edged.
     pub(crate) pieces: Vec<(Segment, bool)>,
     start: Option<Point>,
 }
@@ -118,7 +119,7 @@ impl Interpreter {
                 if let Some(before) = self.polygon.before.take() {
                     self.down = before.down;
                     self.relative = before.relative;
-                    self.place(before.position);
+                    self.set_pen_position(before.position);
                 }
             }
             1.0 | 2.0 => self.report(codes::BAD_PARAMETERS, || "PM1 and PM2 need a PM0 before them".into()),

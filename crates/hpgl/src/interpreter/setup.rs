@@ -7,22 +7,24 @@ use super::fill::FillType;
 use super::frame::{Rotation, Scale};
 use super::line_type::LineType;
 use super::ticks::Ticks;
-use super::{Holder, Interpreter};
+use super::{Interpreter, PenSelection};
 use crate::codes;
 use crate::profile::paper_of_code;
 
-/// `PS` with one number up to this is the code of a paper format (7475A, 7550A); more is a length in plotter units.
+/// `PS` with one number up to this is the code of a paper format (7475A, 7550A); more is a length
+/// in plotter units.
 const LARGEST_PAPER_CODE: f64 = 130.0;
 
 impl Interpreter {
-    /// `IN`: everything as it is when the plotter is switched on; the pen goes up and to the origin.
+    /// `IN`: everything as it is when the plotter is switched on; the pen goes up and to the
+    /// origin.
     pub(super) fn initialise(&mut self) {
         self.tracer.finish();
         self.down = false;
         self.relative = false;
         self.chords_by_deviation = false;
-        if self.holder == Holder::Empty {
-            self.holder = Holder::Unsaid;
+        if self.pen_selection == PenSelection::Empty {
+            self.pen_selection = PenSelection::Default;
         }
         self.polygon.clear();
         self.fill = FillType::default();
@@ -33,10 +35,10 @@ impl Interpreter {
         self.tracer.set_dashes(None);
         self.frame.initialise();
         self.tracer.set_clip(self.frame.clip());
-        self.place(Point::ZERO);
+        self.set_pen_position(Point::ZERO);
     }
 
-    /// `DF`: settings of drawing as `IN` makes them; P1, P2, rotation and the pen's place stay.
+    /// `DF`: settings of drawing as `IN` makes them; P1, P2, rotation and the pen position stay.
     pub(super) fn set_defaults(&mut self) {
         self.relative = false;
         self.chords_by_deviation = false;
@@ -89,7 +91,8 @@ impl Interpreter {
         self.frame_changed();
     }
 
-    /// What hangs on the frame: the window, and the line pattern, whose length follows P1 and P2 and which begins anew.
+    /// Updates what depends on the frame: the window, and the line pattern, whose length follows P1
+    /// and P2 and which begins anew.
     fn frame_changed(&mut self) {
         self.tracer.set_clip(self.frame.clip());
         self.apply_line_type();
@@ -127,10 +130,7 @@ impl Interpreter {
         if scale.is_some() && self.frame.points_are_assumed() {
             let (p1, p2) = self.frame.points();
             self.report(codes::ASSUMED_PLOTTER, || {
-                format!(
-                    "no IP says where P1 and P2 are: ({}, {}) and ({}, {}) are taken",
-                    p1.x, p1.y, p2.x, p2.y
-                )
+                format!("no IP sets P1 and P2: ({}, {}) and ({}, {}) are taken", p1.x, p1.y, p2.x, p2.y)
             });
         }
         self.frame.set_scale(scale);
@@ -145,7 +145,7 @@ impl Interpreter {
         };
         self.tracer.finish();
         let position = self.frame.rotate(rotation, self.position);
-        self.place(position);
+        self.set_pen_position(position);
         self.frame_changed();
     }
 
@@ -175,7 +175,7 @@ impl Interpreter {
                 self.report(codes::PAPER_CODE, || format!("PS{code} is the code of a paper format"));
                 self.frame.set_paper(paper_of_code(code));
                 self.frame_changed();
-                self.place(self.position);
+                self.set_pen_position(self.position);
             }
             [length] => self.set_page(length, None),
             [length, width, ..] if length > LARGEST_PAPER_CODE && width > LARGEST_PAPER_CODE => {
@@ -189,7 +189,7 @@ impl Interpreter {
         self.tracer.finish();
         self.frame.set_page(length, width);
         self.frame_changed();
-        self.place(self.position);
+        self.set_pen_position(self.position);
     }
 
     /// A PCL picture frame: the page of HP-GL/2, as far as its size is given.
@@ -199,7 +199,7 @@ impl Interpreter {
             let width = if width > 0.0 { width } else { reach.width() };
             let height = if height > 0.0 { height } else { reach.height() };
             self.frame.set_picture_frame(width, height);
-            self.place(self.position);
+            self.set_pen_position(self.position);
         }
     }
 
@@ -227,12 +227,12 @@ impl Interpreter {
         }
     }
 
-    /// The pen's place in current units.
+    /// The pen position in current units.
     pub(super) fn user_position(&self) -> Point {
         self.frame.user_of_plu(self.position)
     }
 
-    /// The place in current units that lies by the given step from the pen.
+    /// The position in current units at the given offset from the pen.
     pub(super) fn user_offset(&self, dx: f64, dy: f64) -> Point {
         self.user_position() + Vec2::new(dx, dy)
     }

@@ -4,7 +4,7 @@ use drawing::{Line, Pen, Pitch, Point, Rect, Segment, Span, Stroke, clip_segment
 
 use super::line_type::{Dash, Dashes};
 
-/// A stroke takes at least so many bytes of its file, as a rule: `PU100,100;PD100,100;`.
+/// A stroke usually takes at least this many bytes of its file: `PU100,100;PD100,100;`.
 const BYTES_A_STROKE: usize = 20;
 
 /// Steps shorter than this (mm) are rounding, not movement.
@@ -30,7 +30,7 @@ pub(crate) struct Tracer {
     curved: Option<Stroke>,
     /// The bytes of the stroke being drawn.
     source: Span,
-    /// The pen came down at the only point so far: it leaves a dot.
+    /// The pen came down at the only point yet: it leaves a dot.
     dot: bool,
     clip: Option<Rect>,
     dashes: Option<Dashes>,
@@ -42,10 +42,12 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
-    /// With so many dashes at the most, for a plotter with that unit (mm) and a file of that many bytes.
+    /// A tracer that draws at most `dashes` dashes; `unit_mm` is the plotter unit, `length` the
+    /// size of the file in bytes.
     pub(crate) fn new(dashes_left: f64, unit_mm: f64, file_bytes: usize) -> Self {
         Self {
-            // Room for the strokes of most files, which takes no memory before it is used: a list that grows does.
+            // Capacity for the strokes of most files. Memory is only committed when used; growing
+            // would copy.
             strokes: Vec::with_capacity(file_bytes / BYTES_A_STROKE),
             pitch: Pitch::from_mm(unit_mm),
             pen: Pen(1),
@@ -92,12 +94,14 @@ impl Tracer {
         }
     }
 
-    /// Draws with that line pattern from now on, as far as it has come, and gives the one before back.
+    /// Draws with that line pattern from now on, as far as it has come, and gives the one before
+    /// back.
     pub(crate) fn swap_dashes(&mut self, dashes: Option<Dashes>) -> Option<Dashes> {
         std::mem::replace(&mut self.dashes, dashes)
     }
 
-    /// Whether lines were drawn solid because dashes would have been too many, since this was last asked.
+    /// Whether lines were drawn solid because dashes would have been too many, since this was last
+    /// asked.
     pub(crate) fn take_given_up(&mut self) -> bool {
         std::mem::take(&mut self.given_up)
     }
@@ -153,8 +157,8 @@ impl Tracer {
         }
     }
 
-    /// Draws an outline by itself: its pieces, as far as their pen is down. The line pattern begins anew, and goes on
-    /// afterwards where it was.
+    /// Draws an outline by itself: its pieces, as far as their pen is down. The line pattern begins
+    /// anew, and continues afterwards where it was.
     pub(crate) fn outline(&mut self, pieces: impl Iterator<Item = (Segment, bool)>) {
         self.finish();
         let dashes = self.dashes.clone();

@@ -47,7 +47,7 @@ impl Interpreter {
         if let [_] = pairs.remainder() {
             let mnemonic = self.mnemonic;
             self.report(codes::ODD_COORDINATES, || {
-                format!("`{mnemonic}` ends with an x without y, which is passed over")
+                format!("`{mnemonic}` ends with an x without y, which is skipped")
             });
         }
         if pairs.len() == 0 {
@@ -81,7 +81,7 @@ impl Interpreter {
         }
     }
 
-    /// Goes straight to a place in plotter units with the pen as it is.
+    /// Moves straight to a position in plotter units with the pen as it is.
     #[inline]
     pub(super) fn go(&mut self, to: Point) {
         if !self.is_sane(to) {
@@ -98,8 +98,8 @@ impl Interpreter {
         self.position_mm = to_mm;
     }
 
-    /// `PE`: a polyline in few bytes. Its pairs are relative steps with the pen down unless flagged otherwise; `PA` or
-    /// `PR` are as before afterwards, the pen is as it was last.
+    /// `PE`: a polyline in few bytes. Its pairs are relative steps with the pen down unless flagged
+    /// otherwise; `PA` or `PR` are as before afterwards, the pen is as it was last.
     pub(super) fn polyline_encoded(&mut self, data: &[u8], reencoded: bool) {
         let relative = self.relative;
         let reencoded = reencoded && data.iter().any(|b| matches!(b, 0xc2 | 0xc3));

@@ -1,7 +1,8 @@
 //! From bytes to commands: the state and the recovery around the [`crate::grammar`].
 //!
-//! The parser never fails. It keeps just enough state to know where a command ends (the label terminator, and
-//! whether the bytes are HP-GL, PCL or job control) and leaves meaning to the interpreter.
+//! The parser never fails. It keeps just enough state to know where a command ends (the label
+//! terminator, and whether the bytes are HP-GL, PCL or job control) and leaves meaning to the
+//! interpreter.
 
 mod names;
 mod numbers;

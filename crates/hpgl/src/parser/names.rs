@@ -46,7 +46,8 @@ impl Parser<'_> {
         None
     }
 
-    /// An unknown pair of letters: the next command begins in the same word, or after what looks like parameters.
+    /// An unknown pair of letters: the next command begins in the same word, or after what looks
+    /// like parameters.
     fn resynchronise(&mut self) {
         let start = self.at();
         if let Some(letters) = self.take(stray_letters) {

@@ -10,8 +10,8 @@ use crate::grammar::parameters::{Part, list_end, part};
 use crate::mnemonic::Mnemonic;
 use crate::units::LARGEST_NUMBER;
 
-/// Coordinate lists are handed over in pieces of at most this many numbers, so that memory does not follow the
-/// length of one command.
+/// Coordinate lists are handed over in pieces of at most this many numbers, so that memory does not
+/// follow the length of one command.
 const PIECE: usize = 8192;
 
 /// How a list was read.
@@ -32,8 +32,9 @@ fn is_coordinate_list(mnemonic: Mnemonic) -> bool {
 impl<'a> Parser<'a> {
     /// A command with numbers.
     ///
-    /// Interpreters of the time skip line ends inside numbers, so that files wrapped at a column read; files written
-    /// by hand put a pair on each line without a comma. In a coordinate list the count tells which it is.
+    /// Plotters skip line ends inside numbers, and files wrapped at a column rely on that; files
+    /// written by hand put a pair on each line without a comma. In a coordinate list the count
+    /// decides.
     #[inline]
     pub(super) fn numbers(&mut self, mnemonic: Mnemonic, start: usize) -> Option<Head> {
         let input = self.rest;
@@ -174,7 +175,7 @@ impl<'a> Parser<'a> {
                 if reports && (*after_comma || self.parameters.is_empty()) {
                     let span = Span { start: at, end: at + 1 };
                     self.report(codes::EMPTY_PARAMETER, mnemonic, span, || {
-                        (format!("`{mnemonic}` has an empty parameter, which is passed over"), None)
+                        (format!("`{mnemonic}` has an empty parameter, which is skipped"), None)
                     });
                 }
                 *after_comma = true;

@@ -152,8 +152,9 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Whether the file is Latin-1 that was saved as UTF-8: all of it reads as UTF-8, no character is beyond Latin-1,
-    /// and some byte pair stands for one of the bytes that end numbers in encoded polylines.
+    /// Whether the file is Latin-1 that was saved as UTF-8: all of it reads as UTF-8, no character
+    /// is beyond Latin-1, and some byte pair stands for one of the bytes that end numbers in
+    /// encoded polylines.
     pub(super) fn is_reencoded(&mut self) -> bool {
         if !self.encoding_known {
             self.encoding_known = true;
@@ -172,14 +173,14 @@ impl<'a> Parser<'a> {
         span: Span,
         message: impl FnOnce() -> (String, Option<String>),
     ) {
-        // The pen's place is not the parser's business: the interpreter fills it in.
+        // The parser does not know the pen position: `Findings::set_pen_position` fills it in.
         self.findings.report(code, mnemonic, span, self.number.max(1), Point::ZERO, message);
     }
 
     pub(super) fn report_control(&mut self, mnemonic: Mnemonic, at: usize) {
         let byte = self.bytes[at];
         self.report(codes::CONTROL_BYTE, mnemonic, Span { start: at, end: at + 1 }, || {
-            (format!("byte {byte} is passed over"), None)
+            (format!("byte {byte} is skipped"), None)
         });
     }
 

@@ -21,11 +21,11 @@ impl Parser<'_> {
         let mut text = self.span_of(text);
         if end != LabelEnd::Terminator {
             self.report(codes::LABEL_WITHOUT_TERMINATOR, mnemonic, Span { start, end: text.end }, || {
-                let place = if end == LabelEnd::Eof { "the end of the file" } else { "the next command" };
+                let end_name = if end == LabelEnd::Eof { "the end of the file" } else { "the next command" };
                 let terminator = terminator.escape_ascii();
                 (
                     format!(
-                        "the text of `{mnemonic}` has no terminator (`{terminator}`); it is taken to end at {place}"
+                        "the text of `{mnemonic}` has no terminator (`{terminator}`); it is ended at {end_name}"
                     ),
                     Some("end labels with the byte 3, or name the terminator that the file uses".into()),
                 )
@@ -42,7 +42,7 @@ impl Parser<'_> {
         Some(self.finish(mnemonic, start, text))
     }
 
-    /// `DT`: the next byte is the terminator of labels; nothing or a semicolon restores the usual one.
+    /// `DT`: the next byte is the terminator of labels; without one the default is restored.
     pub(super) fn define_terminator(&mut self, mnemonic: Mnemonic, start: usize) -> Option<Head> {
         let at = self.at();
         match self.take(definition)? {
@@ -62,14 +62,15 @@ impl Parser<'_> {
         Some(self.finish(mnemonic, start, Span { start: at, end: at + 1 }))
     }
 
-    /// `SM`: the next byte is the symbol; nothing or a semicolon ends symbol mode.
+    /// `SM`: the next byte is the symbol; without one symbol mode ends.
     pub(super) fn symbol(&mut self, mnemonic: Mnemonic, start: usize) -> Option<Head> {
         let text = self.take(symbol)?;
         let text = self.span_of(text);
         Some(self.finish(mnemonic, start, text))
     }
 
-    /// `CO`: a comment in quotes, in which semicolons mean nothing; without quotes up to the semicolon.
+    /// `CO`: a comment in quotes, in which semicolons mean nothing; without quotes up to the
+    /// semicolon.
     pub(super) fn comment(&mut self, mnemonic: Mnemonic, start: usize) -> Option<Head> {
         let comment = self.take(comment)?;
         if let Some(quote) = comment.open_quote {

@@ -13,7 +13,7 @@ use crate::mnemonic::Mnemonic;
 const PLU_PER_DECIPOINT: f64 = 1016.0 / 720.0;
 
 impl Parser<'_> {
-    /// A wrapper's command as one of our own.
+    /// Hands a wrapper's sequence to the interpreter as a command.
     fn wrapper(&mut self, mnemonic: Mnemonic, start: usize) -> Head {
         self.number += 1;
         self.textless(mnemonic, start)
@@ -81,8 +81,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Whether HP-GL/2 is entered after this place by `ESC %#B` or by job control; if not, what looks like PCL cannot
-    /// be meant as such.
+    /// Whether HP-GL/2 is entered after this byte by `ESC %#B` or by job control; if not, what
+    /// looks like PCL cannot be meant as such.
     fn hpgl_is_entered_later(&mut self) -> bool {
         let at = self.at();
         match self.next_entry {
@@ -102,7 +102,8 @@ impl Parser<'_> {
         found.is_some()
     }
 
-    /// One step in PCL or RTL: everything up to the next ESC is text on the page, which no pen draws.
+    /// One step in PCL or RTL: everything up to the next ESC is text on the page, which no pen
+    /// draws.
     pub(super) fn pcl(&mut self) -> Step {
         let Some(text) = self.take(text) else { return Step::End };
         if text.iter().any(u8::is_ascii_graphic) {
@@ -133,7 +134,8 @@ impl Parser<'_> {
             // A plotter's own language needs no announcement.
             _ => {
                 self.language = Language::HpGl;
-                // The parser's own test for `@PJL` has failed here, so that this cannot go round in circles.
+                // The parser's own test for `@PJL` has failed here, so that this cannot go round in
+                // circles.
                 Step::Nothing
             }
         }
