@@ -71,12 +71,15 @@ impl Area {
         Some(area)
     }
 
-    fn bands_of(&self, low: f64, high: f64) -> std::ops::RangeInclusive<usize> {
+    /// The band of a height. `more` bands are added, against rounding at the border of two bands.
+    fn band(&self, y: f64, more: f64) -> usize {
         let count = self.bands.len() as f64;
         let scale = count / self.bounds.height().max(1e-12);
-        // One more at either side against rounding.
-        let band = |y: f64, more: f64| ((y - self.bounds.y0) * scale + more).clamp(0.0, count - 1.0) as usize;
-        band(low, -0.01)..=band(high, 0.01)
+        ((y - self.bounds.y0) * scale + more).clamp(0.0, count - 1.0) as usize
+    }
+
+    fn bands_of(&self, low: f64, high: f64) -> std::ops::RangeInclusive<usize> {
+        self.band(low, -0.01)..=self.band(high, 0.01)
     }
 
     /// Winding number (or crossings, by even-odd) of a ray to the right.
@@ -86,8 +89,7 @@ impl Area {
             return false;
         }
         let mut winding = 0;
-        for &index in &self.bands[*self.bands_of(p.y, p.y).start()..=*self.bands_of(p.y, p.y).end()].concat()
-        {
+        for &index in &self.bands[self.band(p.y, 0.0)] {
             let edge = &self.edges[index as usize];
             let rises = edge.from_y <= p.y && p.y < edge.to_y;
             let falls = edge.to_y <= p.y && p.y < edge.from_y;

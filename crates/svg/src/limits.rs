@@ -12,13 +12,13 @@ pub(crate) const ATTRIBUTES: usize = 2000;
 /// Namespace declarations, each counted once for every element below that declares another.
 pub(crate) const NAMESPACES: u64 = 20_000_000;
 /// Elements drawn, with every instance of `use`, markers and clip paths counted.
-pub(crate) const ELEMENTS: u64 = 8_000_000;
+pub(crate) const ELEMENTS: u64 = 3_000_000;
 /// Bytes of attributes read, with every instance counted.
 pub(crate) const ATTRIBUTE_BYTES: u64 = 400_000_000;
 /// Pieces (lines, arcs, cubics) of the result.
 pub(crate) const PIECES: u64 = 10_000_000;
 /// Steps of matching selectors.
-pub(crate) const SELECTOR_STEPS: u64 = 50_000_000;
+pub(crate) const SELECTOR_STEPS: u64 = 20_000_000;
 /// Bytes of one selector.
 pub(crate) const SELECTOR_BYTES: usize = 400;
 /// Dashes of the whole drawing.

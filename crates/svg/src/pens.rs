@@ -15,10 +15,13 @@ pub(crate) struct Layer {
 }
 
 impl Layer {
-    /// The layer of a name. A `!` before it (AxiDraw's pause) does not count.
+    /// The layer of a name. A `!` before it (AxiDraw's pause) does not count, nor does `pen` (Inkscape's
+    /// export of HP-GL takes the number after it).
     pub(crate) fn new(name: &str) -> Self {
-        let digits: String =
-            name.trim_start_matches(['!', ' ']).chars().take_while(char::is_ascii_digit).collect();
+        let text = name.trim_start_matches(['!', ' ']);
+        let is_pen = text.get(..3).is_some_and(|pen| pen.eq_ignore_ascii_case("pen"));
+        let text = if is_pen { text[3..].trim_start() } else { text };
+        let digits: String = text.chars().take_while(char::is_ascii_digit).collect();
         Self { name: name.to_owned(), number: digits.parse().ok().filter(|&number| number > 0) }
     }
 
@@ -139,6 +142,8 @@ mod tests {
         let number = |name: &str| Layer::new(name).number;
         assert_eq!(number("3 red"), Some(3));
         assert_eq!(number("!12-blue"), Some(12));
+        assert_eq!(number("Pen 4 speed 10"), Some(4));
+        assert_eq!(number("pencil 4"), None);
         assert_eq!(number("0 none"), None);
         assert_eq!(number("red 3"), None);
         assert_eq!(number("999999"), None);
