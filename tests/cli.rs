@@ -16,6 +16,21 @@ const TWO_PAGES: &str = "IN;SP1;PU40,40;PD400,40;PU;PG;SP3;PU40,40;PD40,400,800,
 const QUIRKS: &str = "IN;SP1;PU400,400;QQ7;PD800,400;XY1,2;PD400,800,9;PU;LBhello";
 /// Three pens from left to right, the first line twice; the third pen is slow.
 const PENS: &str = "IN;SP1;PU400,400;PD1200,400;PU400,400;PD1200,400;SP2;PU400,800;PD1200,800;SP3;VS2;PU400,1200;PD1200,1200;PU;SP0;";
+/// Two layers of two colours, a hidden one, a filled square, a picture, text.
+const LAYERS: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"
+  width="60mm" height="40mm" viewBox="0 0 60 40" fill="none">
+  <g inkscape:groupmode="layer" inkscape:label="4 blue">
+    <circle cx="30" cy="20" r="10" stroke="#00f"/>
+    <rect id="square" x="5" y="5" width="4" height="4" fill="red"/>
+  </g>
+  <g inkscape:groupmode="layer" inkscape:label="outline" stroke="#f00">
+    <path d="M10 10H50V30"/>
+    <image id="photo" href="photo.png" width="9" height="9"/>
+    <text x="30" y="38" font-family="Helvetica" font-size="5" text-anchor="middle" fill="#f00" stroke="none">Hi</text>
+  </g>
+  <g inkscape:groupmode="layer" inkscape:label="hidden" display="none"><path d="M0 0H60" stroke="#0f0"/></g>
+</svg>
+"##;
 const PRESETS: [&str; 5] = ["coaxial", "corexy", "hbot", "polar", "cartesian"];
 
 /// A temporary working folder of the program.
@@ -558,6 +573,26 @@ fn check_and_info_reports() {
         "info two-pages.hpgl",
     ]);
     insta::assert_snapshot!(said);
+}
+
+#[test]
+fn svg_is_checked_hatched_and_planned() {
+    let dir = TestDir::new();
+    dir.write("layers.svg", LAYERS);
+    let said = dir.transcript(&[
+        "check layers.svg",
+        "check layers.svg --message-format short --hatch 0.5mm,45",
+        "info layers.svg --pens colors --message-format json",
+        "info layers.svg",
+        "check layers.svg --plotter hp7475a",
+        "check tiny.hpgl --pens one",
+        "check layers.svg --hatch 0mm",
+        "explain S0201",
+    ]);
+    insta::assert_snapshot!(said);
+    let plan = dir.command("convert layers.svg --machine cartesian --format csv --output layers.csv").output();
+    assert_eq!(plan.expect("the program runs").status.code(), Some(0));
+    assert!(!dir.text("layers.csv").is_empty());
 }
 
 #[test]

@@ -18,7 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("verify", &["drawing", "kinematics", "plan"]),
     ("picture", &["drawing", "plan"]),
     ("backends", &["drawing", "kinematics", "plan"]),
-    ("compiler", &["drawing", "hpgl", "kinematics", "ordering", "picture", "plan", "planner", "verify"]),
+    ("compiler", &["drawing", "hpgl", "kinematics", "ordering", "picture", "plan", "planner", "svg", "verify"]),
     (
         "plotplan",
         &[

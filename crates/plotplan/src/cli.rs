@@ -9,7 +9,7 @@ use clap::{ArgMatches, Args, CommandFactory as _, Parser, Subcommand, ValueEnum}
 use clap_complete::Shell;
 use compiler::{import, quantity};
 
-/// Compiles pen-plotter drawings (HPGL, HP-GL/2) to motor motion.
+/// Compiles pen-plotter drawings (HPGL, HP-GL/2, SVG) to motor motion.
 ///
 /// `plotplan convert drawing.hpgl --machine coaxial` writes the plan to standard output: a table of motor ticks against
 /// time, certified to draw the drawing within a tolerance and inside the motors' limits.
@@ -119,6 +119,18 @@ pub(crate) struct Reading {
     /// The sheet on the machine: A4, A3,landscape, letter or WxH. With --plotter: the paper of that plotter
     #[arg(long, value_name = "PAPER")]
     pub(crate) paper: Option<String>,
+    /// SVG: how pens are numbered
+    #[arg(long, value_enum, default_value_t = Pens::Layers)]
+    pub(crate) pens: Pens,
+    /// SVG: hatch filled areas with lines this far apart, at this angle (0deg if not given)
+    #[arg(long, value_name = "SPACING[,ANGLE]", value_parser = hatch)]
+    pub(crate) hatch: Option<import::Hatch>,
+    /// SVG: draw the outlines of shapes that have a fill but no stroke
+    #[arg(long)]
+    pub(crate) outline_fills: bool,
+    /// SVG: pixels per inch; 96, or 72 for old files of Illustrator, if not given
+    #[arg(long, value_name = "NUMBER", value_parser = dpi)]
+    pub(crate) dpi: Option<f64>,
     /// How to write diagnostics to standard error
     #[arg(long, value_enum, default_value_t = MessageFormat::Human)]
     pub(crate) message_format: MessageFormat,
@@ -130,9 +142,33 @@ pub(crate) struct Reading {
 impl Reading {
     /// The options of the drawing's importer.
     pub(crate) fn options(&self) -> import::Options {
-        let paper = self.plotter.as_ref().and(self.paper.clone());
-        import::Options { plotter: self.plotter.clone(), paper }
+        import::Options {
+            plotter: self.plotter.clone(),
+            paper: self.plotter.as_ref().and(self.paper.clone()),
+            svg: import::SvgOptions {
+                pens: match self.pens {
+                    Pens::Layers => import::PenRule::Layers,
+                    Pens::Colors => import::PenRule::Colors,
+                    Pens::One => import::PenRule::One,
+                },
+                hatch: self.hatch,
+                outline_fills: self.outline_fills,
+                dpi: self.dpi,
+            },
+        }
     }
+}
+
+/// How the pens of an SVG file are numbered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Pens {
+    /// By the number that a layer's name begins with, other layers in their order; by colour without layers
+    Layers,
+    /// By colour, in order of appearance
+    #[value(alias = "colours")]
+    Colors,
+    /// Pen 1 for everything
+    One,
 }
 
 /// How diagnostics are written.
@@ -574,6 +610,24 @@ fn angle(text: &str) -> Result<f64, String> {
 
 fn length(text: &str) -> Result<f64, String> {
     quantity::length_mm(text, true).map_err(|error| error.to_string())
+}
+
+fn hatch(text: &str) -> Result<import::Hatch, String> {
+    let (spacing, angle) = text.split_once(',').unwrap_or((text, "0deg"));
+    let spacing_mm = length(spacing)?;
+    if !(1e-3..1e4).contains(&spacing_mm) {
+        return Err("the spacing is between 0.001 mm and 10 m".into());
+    }
+    // Degrees need no unit.
+    let angle =
+        if angle.trim().parse::<f64>().is_ok() { format!("{}deg", angle.trim()) } else { angle.into() };
+    let angle_rad = quantity::angle_rad(&angle).map_err(|error| error.to_string())?;
+    Ok(import::Hatch { spacing_mm, angle_rad })
+}
+
+fn dpi(text: &str) -> Result<f64, String> {
+    let dpi = text.trim().parse::<f64>().ok().filter(|dpi| (1.0..=100_000.0).contains(dpi));
+    dpi.ok_or_else(|| format!("{text} is not a number from 1 to 100000"))
 }
 
 fn positions(text: &str) -> Result<(i16, i16), String> {

@@ -79,7 +79,7 @@ impl LoadedDrawing {
 
 /// Reads a drawing and prints its diagnostics. With `--strict` a warning stops here.
 pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedDrawing, Failure> {
-    let options = import::Options { plotter: arguments.plotter.clone(), paper: arguments.paper.clone() };
+    let options = arguments.options();
     let document = import::read(&input.bytes, &options).map_err(|error| Failure::Usage(error.into()))?;
     terminal::diagnostics(input, &document.diagnostics, arguments.message_format);
     let pages = document.pages.len();

@@ -42,6 +42,8 @@ fn render(report: &[Group<'_>]) {
 
 /// Prints diagnostics, each with its place in the file.
 pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: MessageFormat) {
+    // Places in compressed or recoded files are not bytes of the file.
+    let is_plain = std::str::from_utf8(&input.bytes).is_ok();
     for diagnostic in diagnostics {
         match format {
             MessageFormat::Human => {}
@@ -63,6 +65,16 @@ pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: Mes
         if diagnostic.count > 1 {
             title = format!("{title} (and {} more like it)", diagnostic.count - 1);
         }
+        if let Some([line, column]) = diagnostic.line_column.filter(|_| !is_plain) {
+            let mut group = Group::with_title(level.primary_title(title).id(diagnostic.code))
+                .element(Origin::path(&input.name).line(line).char_column(column))
+                .element(Level::NOTE.message(&diagnostic.place));
+            if let Some(help) = &diagnostic.help {
+                group = group.element(Level::HELP.message(help));
+            }
+            render(&[group]);
+            continue;
+        }
         let place = format!("byte {}, {}", diagnostic.span.start, diagnostic.place);
         at_place(
             input,
@@ -80,12 +92,16 @@ pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: Mes
 fn short(input: &Input, diagnostic: &Diagnostic) -> String {
     let Diagnostic { code, severity, span, message, count, .. } = diagnostic;
     let times = if *count > 1 { format!(" ({count} times)") } else { String::new() };
-    format!("{}:{}: {severity}[{code}]: {message}{times}", input.name, span.start)
+    let place = match diagnostic.line_column {
+        Some([line, column]) => format!("{line}:{column}"),
+        None => span.start.to_string(),
+    };
+    format!("{}:{place}: {severity}[{code}]: {message}{times}", input.name)
 }
 
 /// A diagnostic for programs.
 fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
-    serde_json::json!({
+    let mut object = serde_json::json!({
         "file": input.name,
         "code": diagnostic.code,
         "severity": diagnostic.severity.to_string(),
@@ -96,7 +112,12 @@ fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
         "end": diagnostic.span.end,
         "command": diagnostic.command,
         "pen_mm": diagnostic.pen_mm,
-    })
+    });
+    if let Some([line, column]) = diagnostic.line_column {
+        object["line"] = line.into();
+        object["column"] = column.into();
+    }
+    object
 }
 
 /// Prints a message with the window of the file that it is about.

@@ -142,7 +142,7 @@ impl Region {
                 for &index in &area.bands[band] {
                     let edge = &area.edges[index as usize];
                     if *work > 0 && overlap(reach, edge.bounds) {
-                        meet::crossings(piece, &edge.segment, cuts);
+                        *work = work.saturating_sub(meet::crossings(piece, &edge.segment, cuts));
                     }
                 }
             }

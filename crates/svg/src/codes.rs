@@ -89,8 +89,8 @@ codes! {
     UNKNOWN_CHARACTER = 209 "S0209" Error "character not drawn"
         "The built-in stroke font lacks a character. Its place stays empty. Convert the text to paths in an editor."
     TEXT_NOT_DRAWN = 210 "S0210" Error "text not drawn"
-        "Text along a path, text flowed into a shape by a draft of SVG 1.2, or any text where no font is given is not \
-         drawn. Convert it to paths in an editor."
+        "Text flowed into a shape by a draft of SVG 1.2, or any text where no font is given, is not drawn. Convert it to \
+         paths in an editor."
     HIDDEN = 211 "S0211" Note "hidden elements"
         "Elements with `display:none`, `visibility:hidden` or an opacity of 0 are not drawn, nor are hidden layers."
     ZERO_WIDTH = 213 "S0213" Note "stroke without width"

@@ -66,9 +66,10 @@ pub(crate) fn cut(
 }
 
 /// A piece measured along its length.
-struct Lengths {
-    segment: Segment,
-    total: f64,
+#[derive(Debug)]
+pub(crate) struct Lengths {
+    pub(crate) segment: Segment,
+    pub(crate) total: f64,
     /// Lengths up to equal steps of the parameter, for ellipses.
     table: Vec<f64>,
 }
@@ -76,7 +77,7 @@ struct Lengths {
 const STEPS: usize = 64;
 
 impl Lengths {
-    fn of(segment: Segment) -> Self {
+    pub(crate) fn of(segment: Segment) -> Self {
         let mut table = Vec::new();
         let total = match &segment {
             Segment::Arc(arc) if arc.circle_radius().is_none() => {
@@ -94,7 +95,7 @@ impl Lengths {
     }
 
     /// The parameter at a length from the start.
-    fn parameter(&self, length: f64) -> f64 {
+    pub(crate) fn parameter(&self, length: f64) -> f64 {
         let t = match &self.segment {
             Segment::Cubic(cubic) => cubic.inv_arclen(length, ACCURACY * (1.0 + self.total)),
             Segment::Arc(arc) if !self.table.is_empty() => {

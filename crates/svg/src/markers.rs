@@ -122,7 +122,7 @@ fn draw_one<'a>(
     let content = view
         .map_or(Affine::IDENTITY, |view| viewport::onto(view, viewport::aspect_ratio(marker), width, height));
     let reference = content * reference(marker, view, width, height);
-    let Some(mut inner) = walker.marker_scope(scope, marker) else { return };
+    let Some(mut inner) = walker.content_scope(scope, marker) else { return };
     inner.map = scope.map
         * Affine::translate(vertex.place.to_vec2())
         * attributes::rotation(degrees)

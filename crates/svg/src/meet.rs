@@ -10,8 +10,9 @@ const MOST_CHORDS: usize = 256;
 const CLOSE_MM: f64 = 1e-10;
 
 /// Adds the parameters strictly inside (0, 1) at which `piece` crosses `edge`. A touch may count or not; a piece that
-/// runs along the edge has no crossings but, possibly, at the edge's ends.
-pub(crate) fn crossings(piece: &Segment, edge: &Segment, cuts: &mut Vec<f64>) {
+/// runs along the edge has no crossings but, possibly, at the edge's ends. Returns the work done, in tests of a pair's
+/// bounding boxes.
+pub(crate) fn crossings(piece: &Segment, edge: &Segment, cuts: &mut Vec<f64>) -> u64 {
     let mut add = |t: f64| {
         if t > 0.0 && t < 1.0 {
             cuts.push(t);
@@ -30,7 +31,7 @@ pub(crate) fn crossings(piece: &Segment, edge: &Segment, cuts: &mut Vec<f64>) {
                 for end in [other.p0, other.p1] {
                     add(along(end));
                 }
-                return;
+                return 1;
             }
             line_crossings(line, edge, |u| {
                 if within(u) {
@@ -46,8 +47,9 @@ pub(crate) fn crossings(piece: &Segment, edge: &Segment, cuts: &mut Vec<f64>) {
                 }
             });
         }
-        _ => curve_crossings(piece, edge, add),
+        _ => return curve_crossings(piece, edge, add),
     }
+    10
 }
 
 fn parallel(one: &Line, other: &Line) -> bool {
@@ -116,7 +118,7 @@ fn cubic_roots(f: [f64; 4]) -> Vec<f64> {
 }
 
 /// Crossings of two curves: pairs of chords that come close, refined by Newton's method on both parameters.
-fn curve_crossings(piece: &Segment, edge: &Segment, mut add: impl FnMut(f64)) {
+fn curve_crossings(piece: &Segment, edge: &Segment, mut add: impl FnMut(f64)) -> u64 {
     let (one, other) = (chords(piece), chords(edge));
     let near = |a: Rect, b: Rect| {
         a.x0 <= b.x1 + CHORD_MM
@@ -125,16 +127,19 @@ fn curve_crossings(piece: &Segment, edge: &Segment, mut add: impl FnMut(f64)) {
             && b.y0 <= a.y1 + CHORD_MM
     };
     let counts = [one.len() as f64, other.len() as f64];
+    let mut work = (one.len() * other.len()) as u64;
     for (i, a) in one.iter().enumerate() {
         for (j, b) in other.iter().enumerate() {
             if near(a.inflate(CHORD_MM, CHORD_MM), *b) {
                 let guess = [(i as f64 + 0.5) / counts[0], (j as f64 + 0.5) / counts[1]];
+                work += 1000;
                 if let Some(t) = refine(piece, edge, guess) {
                     add(t);
                 }
             }
         }
     }
+    work
 }
 
 /// The boxes of chords of equal steps of the parameter.

@@ -19,7 +19,7 @@ pub fn looks_like_svg(bytes: &[u8]) -> bool {
         head.extend(bytes.iter().take(window as usize));
     }
     let text = decode(&head).map_or_else(|| latin1(&head), |text| text);
-    let text = text.trim_start();
+    let text = text.trim_start_matches('\u{feff}').trim_start();
     if !text.starts_with('<') {
         return false;
     }
@@ -66,7 +66,7 @@ pub(crate) fn text(bytes: &[u8], findings: &mut Findings) -> Option<String> {
     Some(latin1(bytes))
 }
 
-/// UTF-8 or, by its byte order mark, UTF-16.
+/// UTF-8 (a byte order mark stays, so that places remain those of the file) or, by its mark, UTF-16.
 fn decode(bytes: &[u8]) -> Option<String> {
     let utf16 = |unit: fn([u8; 2]) -> u16| {
         let units = bytes[2..].chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
@@ -75,7 +75,6 @@ fn decode(bytes: &[u8]) -> Option<String> {
     match bytes {
         [0xff, 0xfe, ..] => utf16(u16::from_le_bytes),
         [0xfe, 0xff, ..] => utf16(u16::from_be_bytes),
-        [0xef, 0xbb, 0xbf, rest @ ..] => std::str::from_utf8(rest).ok().map(str::to_owned),
         _ => std::str::from_utf8(bytes).ok().map(str::to_owned),
     }
 }

@@ -29,6 +29,17 @@ pub(crate) enum Anchor {
     End,
 }
 
+impl Anchor {
+    /// The share of a text's width that lies before its point.
+    pub(crate) fn share(self) -> f64 {
+        match self {
+            Self::Start => 0.0,
+            Self::Middle => 0.5,
+            Self::End => 1.0,
+        }
+    }
+}
+
 /// Where the point of a text lies across its line, in font sizes above the base line.
 pub(crate) const MIDDLE_EM: f64 = 0.35;
 pub(crate) const HANGING_EM: f64 = 0.7;

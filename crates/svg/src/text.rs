@@ -2,14 +2,16 @@
 
 use std::rc::Rc;
 
-use drawing::{Affine, Point};
+use drawing::{Affine, Point, Vec2};
 use svgtypes::LengthListParser;
 
 use crate::attributes;
 use crate::codes;
+use crate::dashes::Lengths;
 use crate::path::Subpath;
-use crate::style::{Anchor, Style};
-use crate::units::Axis;
+use crate::shapes;
+use crate::style::Style;
+use crate::units::{self, Axis, Basis};
 use crate::walk::{Element, Scope, Walker};
 
 /// Height of capitals in font sizes, as common fonts have it.
@@ -40,6 +42,21 @@ struct Letters<'a> {
     lists: Vec<Lists>,
 }
 
+/// Reports the font that the stroke font stands for; false where there is no font at all.
+fn report_font<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, style: &Style<'a>) -> bool {
+    let family = style.font_family.split(',').next().unwrap_or("").trim().trim_matches(['"', '\'']);
+    let family = if family.is_empty() { "default" } else { family };
+    if walker.options.font.is_none() {
+        walker.note(codes::TEXT_NOT_DRAWN, "text", node, "text is not drawn: no font is given");
+        return false;
+    }
+    walker.report(codes::TEXT_FONT, family, node, || {
+        let help = "convert the text to paths in an editor for its own letter shapes".into();
+        (format!("text in the font {family} is drawn in the stroke font"), Some(help))
+    });
+    true
+}
+
 /// Draws a text element.
 pub(crate) fn draw<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>) {
     let mut letters = Letters::default();
@@ -48,17 +65,9 @@ pub(crate) fn draw<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &S
         letters.list.pop();
     }
     let Some(first) = letters.list.first() else { return };
-    let family = first.style.font_family.split(',').next().unwrap_or("").trim().trim_matches(['"', '\'']);
-    let family = if family.is_empty() { "default" } else { family };
-    if walker.options.font.is_none() {
-        walker.note(codes::TEXT_NOT_DRAWN, "text", node, "text is not drawn: no font is given");
-        return;
+    if report_font(walker, node, &first.style) {
+        lay_out(walker, node, scope, &letters.list);
     }
-    walker.report(codes::TEXT_FONT, family, node, || {
-        let help = "convert the text to paths in an editor for its own letter shapes".into();
-        (format!("text in the font {family} is drawn in the stroke font"), Some(help))
-    });
-    lay_out(walker, node, scope, &letters.list);
 }
 
 /// Gathers the characters of an element and of the `tspan`s in it.
@@ -78,7 +87,9 @@ fn collect<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
     letters.lists.push(Lists { first: letters.list.len(), values });
     for child in node.children() {
         if let Some(text) = child.text().filter(|_| child.is_text()) {
-            letters.add(text, &scope.style);
+            if walker.may_read(node, text.len()) {
+                letters.add(text, &scope.style);
+            }
             continue;
         }
         match attributes::name(child) {
@@ -90,10 +101,11 @@ fn collect<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
                 }
             }
             Some("textPath") => {
-                let help = "convert it to paths in an editor".into();
-                walker.report(codes::TEXT_NOT_DRAWN, "textPath", child, || {
-                    ("text along a path is not drawn".into(), Some(help))
-                });
+                let mut inner = scope.clone();
+                inner.style = Rc::new(walker.style(child, &scope.style, basis));
+                if inner.style.displayed {
+                    along_path(walker, child, &inner);
+                }
             }
             _ => {}
         }
@@ -165,16 +177,65 @@ fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
             let blank = if letter.character == ' ' { letter.style.word_spacing } else { 0.0 };
             at.x += advance * em * letter.style.font_size + letter.style.letter_spacing + blank;
         }
-        let share = match first.style.anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => 0.5,
-            Anchor::End => 1.0,
-        };
-        let back = share * (at.x - origin.x);
+        let back = first.style.anchor.share() * (at.x - origin.x);
         for (letter, place) in chunk.iter().zip(places) {
             draw_letter(walker, node, scope, letter, Point::new(place.x - back, place.y));
         }
         at.x -= back;
+    }
+}
+
+/// Draws the characters of a `textPath` along its path, each at the middle of its width.
+fn along_path<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>) {
+    let Some(target) = attributes::href(node).and_then(|href| walker.target(node, href, scope)) else {
+        return;
+    };
+    let mut letters = Letters::default();
+    collect(walker, node, scope, &mut letters);
+    let Some(first) = letters.list.first() else { return };
+    if !report_font(walker, node, &first.style) || walker.content_scope(scope, target).is_none() {
+        return;
+    }
+    let Some(font) = walker.options.font else { return };
+    let basis = scope.basis();
+    let shape = shapes::outline(attributes::name(target).unwrap_or(""), target, basis);
+    let map = target.attribute("transform").and_then(attributes::transform).unwrap_or_default();
+    let pieces = shape.subpaths.iter().flat_map(|subpath| &subpath.segments);
+    let mut total = 0.0;
+    let mut way: Vec<(f64, Lengths)> = Vec::new();
+    for piece in pieces {
+        let lengths = Lengths::of(piece.transformed(map));
+        way.push((total, lengths));
+        total += way.last().map_or(0.0, |(_, lengths)| lengths.total);
+    }
+    let em = CAP_HEIGHT_EM / font.cap_height();
+    let advance = |letter: &Letter<'_>| {
+        let own = font.glyph(letter.character).map_or(0.6 / em, |glyph| glyph.advance);
+        own * em * letter.style.font_size
+    };
+    let spacing = |letter: &Letter<'_>| {
+        letter.style.letter_spacing + if letter.character == ' ' { letter.style.word_spacing } else { 0.0 }
+    };
+    let offset = Basis { width: total, ..basis };
+    let offset =
+        node.attribute("startOffset").and_then(units::parse).map_or(0.0, |l| offset.user(l, Axis::X));
+    let width: f64 = letters.list.iter().map(|letter| advance(letter) + spacing(letter)).sum();
+    let mut at = offset - first.style.anchor.share() * width;
+    for letter in &letters.list {
+        let (half, middle) = (0.5 * advance(letter), at + 0.5 * advance(letter));
+        at += advance(letter) + spacing(letter);
+        if !(0.0..=total).contains(&middle) {
+            continue;
+        }
+        let index = way.partition_point(|(start, _)| *start <= middle).max(1) - 1;
+        let Some((start, lengths)) = way.get(index) else { return };
+        let t = lengths.parameter(middle - start);
+        let direction = lengths.segment.derivatives(t).0;
+        let degrees = libm::atan2(direction.y, direction.x).to_degrees();
+        let (sin, cos) = attributes::sin_cos(degrees);
+        let place = lengths.segment.eval(t) - half * Vec2::new(cos, sin);
+        let turned = Letter { rotation_deg: degrees, style: Rc::clone(&letter.style), ..*letter };
+        draw_letter(walker, node, scope, &turned, place);
     }
 }
 

@@ -125,10 +125,7 @@ impl<'a> Walker<'a, '_> {
             return false;
         }
         self.elements_left -= 1;
-        let bytes = node.attributes().map(|attribute| attribute.value().len() as u64).sum();
-        self.bytes_left = self.bytes_left.saturating_sub(bytes);
-        if self.bytes_left == 0 {
-            self.stop(node, "references multiply the drawing to hundreds of megabytes");
+        if !self.may_read(node, node.attributes().map(|attribute| attribute.value().len()).sum()) {
             return false;
         }
         if scope.depth >= limits::DEPTH {
@@ -136,6 +133,15 @@ impl<'a> Walker<'a, '_> {
             return false;
         }
         true
+    }
+
+    /// Counts bytes of attributes and text, and stops where references multiply them.
+    pub(crate) fn may_read(&mut self, node: Element<'a>, bytes: usize) -> bool {
+        self.bytes_left = self.bytes_left.saturating_sub(bytes as u64);
+        if self.bytes_left == 0 && !self.stopped {
+            self.stop(node, "references multiply the drawing to hundreds of megabytes");
+        }
+        !self.stopped
     }
 
     /// Draws an element.

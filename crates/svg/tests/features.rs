@@ -409,6 +409,16 @@ fn tspans_place_and_blanks_collapse() {
 }
 
 #[test]
+fn text_follows_a_path() {
+    let (found, _) = text(
+        "<defs><path id='p' d='M50 90V10'/></defs>\
+         <text font-size='10' fill='red'><textPath xlink:href='#p' startOffset='50%' text-anchor='middle'>ab</textPath></text>",
+    );
+    // Letters 7 wide go up from y = 57; their tops point to the left.
+    assert_eq!(found, [[50.0, 57.0, 43.0, 57.0], [50.0, 50.0, 43.0, 50.0]]);
+}
+
+#[test]
 fn characters_without_glyph_are_reported() {
     let (_, document) = text("<text fill='red' y='9'>日a日</text>");
     assert_eq!(codes(&document), [("S0208", 1), ("S0209", 2)]);

@@ -47,12 +47,18 @@ pub struct Page {
 }
 
 /// What a file states about a pen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PenSettings {
     /// Speed with the pen down, mm/s.
     pub speed_mm_s: Option<f64>,
     /// Width of the line, mm.
     pub width_mm: Option<f64>,
+    /// Name of the layer that it draws.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its colour: red, green, blue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub color: Option<[u8; 3]>,
 }
 
 /// How much a finding matters.
@@ -96,6 +102,8 @@ pub struct Diagnostic {
     pub span: Span,
     /// The first place in the terms of the format, such as `command 3, pen at 1.00, 2.00 mm`.
     pub place: String,
+    /// Line and column of the first place, from 1, in formats of lines.
+    pub line_column: Option<[usize; 2]>,
     /// Number of the command at the first place, from 1, in formats of commands.
     pub command: Option<usize>,
     /// Where the pen was at the first place, mm, in formats that move a pen.

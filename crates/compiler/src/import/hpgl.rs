@@ -50,7 +50,7 @@ fn reader_options(options: &Options) -> Result<hpgl::Options, ImportError> {
 }
 
 fn pen_settings(settings: hpgl::PenSettings) -> PenSettings {
-    PenSettings { speed_mm_s: settings.speed_mm_s, width_mm: settings.width_mm }
+    PenSettings { speed_mm_s: settings.speed_mm_s, width_mm: settings.width_mm, ..PenSettings::default() }
 }
 
 fn diagnostic(found: hpgl::Diagnostic) -> Diagnostic {
@@ -68,6 +68,7 @@ fn diagnostic(found: hpgl::Diagnostic) -> Diagnostic {
         count: found.count,
         span: found.span,
         place: format!("command {}, pen at {x:.2}, {y:.2} mm", found.command),
+        line_column: None,
         command: Some(found.command),
         pen_mm: Some([x, y]),
     }

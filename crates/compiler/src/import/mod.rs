@@ -7,20 +7,30 @@
 mod document;
 mod hpgl;
 mod points;
+mod svg;
 
 use std::fmt::Write as _;
 
 use sha2::Digest as _;
 
 pub use self::document::{Diagnostic, Document, Fact, Page, PenSettings, Severity};
+pub use self::svg::{Hatch, PenRule, SvgOptions};
 
 /// What a reader needs to know besides the bytes.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Options {
     /// The HP-GL plotter that the file was made for; found from the file if `None`.
     pub plotter: Option<String>,
     /// The paper loaded in that plotter; the plotter's first one if `None`.
     pub paper: Option<String>,
+    /// How an SVG file is read.
+    #[serde(skip_serializing_if = "is_default")]
+    pub svg: SvgOptions,
+}
+
+/// Whether the options for SVG are those that apply without being asked for.
+fn is_default(options: &SvgOptions) -> bool {
+    *options == SvgOptions::default()
 }
 
 /// Why a file is not read at all.
@@ -34,6 +44,14 @@ pub enum ImportError {
         name: String,
         /// All names.
         known: Vec<&'static str>,
+    },
+    /// Options are given that mean nothing for this format.
+    #[error("{options} not for {format}: no effect on this file")]
+    NoEffect {
+        /// The options, with their verb.
+        options: &'static str,
+        /// The format's name.
+        format: &'static str,
     },
     /// The plotter does not take this paper.
     #[error("plotter {plotter} has no paper {name}; it takes {}", known.join(", "))]
@@ -59,20 +77,25 @@ pub struct Importer {
 }
 
 /// All importers, in the order in which they are asked.
-pub const IMPORTERS: &[Importer] = &[points::IMPORTER, hpgl::IMPORTER];
+pub const IMPORTERS: &[Importer] = &[svg::IMPORTER, points::IMPORTER, hpgl::IMPORTER];
 
 /// Reads a drawing of any recognized format.
 ///
 /// # Errors
-/// Options that name an unknown plotter or paper.
+/// Options that name an unknown plotter or paper, or that mean nothing for the format.
 pub fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     let importer = IMPORTERS.iter().find(|importer| (importer.recognizes)(bytes));
-    (importer.unwrap_or(&hpgl::IMPORTER).read)(bytes, options)
+    let importer = importer.unwrap_or(&hpgl::IMPORTER);
+    if importer.name != svg::IMPORTER.name && !is_default(&options.svg) {
+        let options = "--pens, --hatch, --outline-fills and --dpi are";
+        return Err(ImportError::NoEffect { options, format: importer.name });
+    }
+    (importer.read)(bytes, options)
 }
 
 /// The title, severity and explanation of a diagnostic's code, whichever importer reports it.
 pub fn explain(code: &str) -> Option<(String, &'static str)> {
-    hpgl::explain(code)
+    hpgl::explain(code).or_else(|| svg::explain(code))
 }
 
 /// The known HP-GL plotters with their papers, one a line.

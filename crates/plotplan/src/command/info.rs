@@ -63,13 +63,19 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
         for pen in drawing.pens() {
             let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
             let (count, ink_mm) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
-            let settings = page.pens.get(&pen).copied().unwrap_or_default();
+            let settings = page.pens.get(&pen).cloned().unwrap_or_default();
             let mut own = String::new();
             if let Some(speed) = settings.speed_mm_s {
                 let _ = write!(own, ", {speed:.0} mm/s");
             }
             if let Some(width) = settings.width_mm {
                 let _ = write!(own, ", {width:.2} mm wide");
+            }
+            if let Some([red, green, blue]) = settings.color {
+                let _ = write!(own, ", #{red:02x}{green:02x}{blue:02x}");
+            }
+            if let Some(name) = settings.name {
+                let _ = write!(own, ", {name:?}");
             }
             let _ =
                 writeln!(text, "pen {:<4} {}, {}{own}", pen.0, pluralize(count, "stroke"), length(ink_mm));

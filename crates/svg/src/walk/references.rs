@@ -29,10 +29,10 @@ impl<'a> Walker<'a, '_> {
         Scope { references: Rc::new(references), depth: scope.depth + 1, ..scope.clone() }
     }
 
-    /// The scope of a marker's content but for its map and style; nothing where nothing more may be drawn.
-    pub(crate) fn marker_scope(&mut self, scope: &Scope<'a>, marker: Element<'a>) -> Option<Scope<'a>> {
-        let inner = Self::referring(scope, marker);
-        self.may_enter(marker, &inner).then_some(inner)
+    /// The scope of what is referred to but for its map and style; nothing where nothing more may be drawn.
+    pub(crate) fn content_scope(&mut self, scope: &Scope<'a>, target: Element<'a>) -> Option<Scope<'a>> {
+        let inner = Self::referring(scope, target);
+        self.may_enter(target, &inner).then_some(inner)
     }
 
     /// Draws what a `use` element refers to.
