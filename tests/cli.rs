@@ -590,7 +590,8 @@ fn svg_is_checked_hatched_and_planned() {
         "explain S0201",
     ]);
     insta::assert_snapshot!(said);
-    let plan = dir.command("convert layers.svg --machine cartesian --format csv --output layers.csv").output();
+    let plan =
+        dir.command("convert layers.svg --machine cartesian --format csv --output layers.csv").output();
     assert_eq!(plan.expect("the program runs").status.code(), Some(0));
     assert!(!dir.text("layers.csv").is_empty());
 }

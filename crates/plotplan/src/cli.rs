@@ -612,17 +612,14 @@ fn length(text: &str) -> Result<f64, String> {
     quantity::length_mm(text, true).map_err(|error| error.to_string())
 }
 
+/// Spacing of a hatch, and its angle after a comma.
 fn hatch(text: &str) -> Result<import::Hatch, String> {
-    let (spacing, angle) = text.split_once(',').unwrap_or((text, "0deg"));
+    let (spacing, direction) = text.split_once(',').unwrap_or((text, "0"));
     let spacing_mm = length(spacing)?;
     if !(1e-3..1e4).contains(&spacing_mm) {
-        return Err("the spacing is between 0.001 mm and 10 m".into());
+        return Err("the spacing must be between 0.001 mm and 10 m".into());
     }
-    // Degrees need no unit.
-    let angle =
-        if angle.trim().parse::<f64>().is_ok() { format!("{}deg", angle.trim()) } else { angle.into() };
-    let angle_rad = quantity::angle_rad(&angle).map_err(|error| error.to_string())?;
-    Ok(import::Hatch { spacing_mm, angle_rad })
+    Ok(import::Hatch { spacing_mm, angle_rad: angle(direction)? })
 }
 
 fn dpi(text: &str) -> Result<f64, String> {

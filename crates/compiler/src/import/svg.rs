@@ -51,7 +51,7 @@ pub(super) fn explain(code: &str) -> Option<(String, &'static str)> {
 
 fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     if options.plotter.is_some() || options.paper.is_some() {
-        return Err(ImportError::NoEffect { options: "--plotter and --paper are", format: IMPORTER.name });
+        return Err(ImportError::NoEffect { options: "--plotter is", format: IMPORTER.name });
     }
     let wanted = &options.svg;
     let document = svg::read(
