@@ -54,7 +54,7 @@ const STEPS: &[Step] = &[
 const PROPTEST_SEED: &str = "20261122";
 
 /// Fuzz targets (`fuzz/fuzz_targets`), seconds for each.
-const FUZZ_TARGETS: &[&str] = &["read", "emit"];
+const FUZZ_TARGETS: &[&str] = &["read", "emit", "svg"];
 const FUZZ_SECONDS: u32 = 30;
 
 /// Runs the named steps, or the default ones, up to the first failure; prints the time of each.
@@ -178,22 +178,27 @@ fn fuzz() -> Result<()> {
     for target in FUZZ_TARGETS {
         let seeds = crate::top().join("fuzz/corpus").join(target);
         std::fs::create_dir_all(&seeds).with_context(|| format!("{}", seeds.display()))?;
-        for folder in ["examples", "tests/drawings"] {
-            copy_drawings(&crate::top().join(folder), &seeds)?;
+        let (folders, extensions, dictionary): (&[_], &[_], _) = if *target == "svg" {
+            (&["examples"], &["svg"], "svg.dict")
+        } else {
+            (&["examples", "tests/drawings"], &["hpgl", "pcl"], "hpgl.dict")
+        };
+        for folder in folders {
+            copy_drawings(&crate::top().join(folder), &seeds, extensions)?;
         }
         cargo(&format!(
-            "+nightly fuzz run {target} -- -dict=fuzz/hpgl.dict -max_len=4096 -timeout=20 \
+            "+nightly fuzz run {target} -- -dict=fuzz/{dictionary} -max_len=4096 -timeout=20 \
              -max_total_time={FUZZ_SECONDS} -verbosity=0"
         ))?;
     }
     Ok(())
 }
 
-fn copy_drawings(from: &Path, to: &Path) -> Result<()> {
+fn copy_drawings(from: &Path, to: &Path, extensions: &[&str]) -> Result<()> {
     let mut copied = 0;
     for entry in std::fs::read_dir(from).with_context(|| format!("{}", from.display()))? {
         let path = entry?.path();
-        if path.extension().is_some_and(|e| e == "hpgl" || e == "pcl") {
+        if path.extension().is_some_and(|e| extensions.iter().any(|known| e == *known)) {
             let name = path.file_name().context("a file without a name")?;
             std::fs::copy(&path, to.join(name)).with_context(|| format!("{}", path.display()))?;
             copied += 1;
