@@ -1,9 +1,24 @@
 //! HP-GL and HP-GL/2, the languages of pen plotters: from bytes to a [`Drawing`], and back.
 //!
 //! ```
-//! let document = hpgl::read(b"IN;SP1;PU0,0;PD400,0,400,400;PU;", &hpgl::Options::default());
-//! assert_eq!(document.pages[0].drawing.length(), 20.0); // mm
-//! assert!(document.diagnostics.is_empty());
+//! let file = b"IN;SP1;PU0,0;PD400,0,400,400;QQ7;PU;";
+//! let document = hpgl::read(file, &hpgl::Options::default());
+//!
+//! // One page with one stroke of pen 1: 10 mm to the right, 10 mm up.
+//! let drawing = &document.pages[0].drawing;
+//! assert_eq!(drawing.strokes.len(), 1);
+//! assert_eq!(drawing.strokes[0].pen, hpgl::Pen(1));
+//! assert_eq!(drawing.length(), 20.0);
+//!
+//! // `QQ` is no command: it is skipped and reported with its bytes.
+//! let diagnostic = &document.diagnostics[0];
+//! assert_eq!(diagnostic.code.name(), "H0101");
+//! assert_eq!(&file[diagnostic.span.start..diagnostic.span.end], b"QQ");
+//! assert_eq!(diagnostic.to_string(), "warning[H0101] byte 29: unknown command `QQ` is skipped");
+//!
+//! // Written again as clean HP-GL.
+//! let clean = hpgl::emit(drawing, &hpgl::EmitOptions::default());
+//! assert_eq!(hpgl::read(&clean, &hpgl::Options::default()).pages[0].drawing.length(), 20.0);
 //! ```
 //!
 //! Two passes, two types: [`parse`] turns bytes into a [`Syntax`] (commands, numbers, where they

@@ -3,45 +3,10 @@
 //! Expected geometry rests on the HP-GL/2 rules as GhostPDL's interpreter and hp2xx show them on
 //! probe files; where the two differ, the comment says which one is followed and why.
 
-use std::fmt::Write as _;
+mod common;
 
-use hpgl::{Document, Generation, Options, Point, ProfileReason, Severity, Wrappers, read};
-
-fn document(bytes: &[u8]) -> Document {
-    let options = Options::default();
-    let document = read(bytes, &options);
-    assert_eq!(document, hpgl::interpret(&hpgl::parse(bytes, &options), &options), "one pass and two differ");
-    document
-}
-
-/// The strokes of the first page in plotter units: `pen: x,y x,y ...`, curves marked by `~` before
-/// their end.
-fn ink(document: &Document) -> Vec<String> {
-    let stroke = |stroke: &drawing::Stroke| {
-        let plu = |mm: f64| {
-            let value = mm / hpgl::PLOTTER_UNIT_MM;
-            ((value * 1e4).round() / 1e4 + 0.0).to_string()
-        };
-        let mut text = format!("{}: {},{}", stroke.pen.0, plu(stroke.start().x), plu(stroke.start().y));
-        for segment in stroke.segments() {
-            let curve = if matches!(segment, drawing::Segment::Line(_)) { "" } else { "~" };
-            let _ = write!(text, " {curve}{},{}", plu(segment.end().x), plu(segment.end().y));
-        }
-        text
-    };
-    document.pages[0].drawing.strokes.iter().map(stroke).collect()
-}
-
-fn codes(document: &Document) -> Vec<&'static str> {
-    document.diagnostics.iter().map(|diagnostic| diagnostic.code.name()).collect()
-}
-
-#[track_caller]
-fn check(bytes: &[u8], strokes: &[&str], diagnostics: &[&str]) {
-    let document = document(bytes);
-    assert_eq!(ink(&document), strokes, "ink of {:?}", bytes.escape_ascii().to_string());
-    assert_eq!(codes(&document), diagnostics, "diagnostics of {:?}", bytes.escape_ascii().to_string());
-}
+use common::{check, codes, document, ink};
+use hpgl::{Generation, Options, Point, ProfileReason, Severity, Wrappers, read};
 
 /// The same corner in different notations.
 #[track_caller]
@@ -419,7 +384,7 @@ fn windows() {
     check(b"IN;SP1;PS2000,4000;PD4000,2000;", &["1: 0,0 4000,2000"], &[]);
     check(b"IN;SP1;PS2000,4000;RO90;PD2000,4000;", &["1: 0,0 0,2000"], &[]);
     check(b"IN;SP1;IW5,5,5,9;PD400,0;IW;PD400,400;", &["1: 400,0 400,400"], &["H0211", "H0210"]);
-    // A window in user units pen_moves with the scaling points.
+    // A window in user units moves with the scaling points.
     check(
         b"IN;SP1;IP0,0,100,100;SC0,10,0,10;IW0,0,5,10;IP0,0,1000,1000;PA0,0;PD10,0;",
         &["1: 0,0 500,0"],
