@@ -159,6 +159,9 @@ codes! {
     ENCODED_REENCODED = 119 "H0119" Warning "encoded polyline repaired"
         "The file was saved as UTF-8 by an editor that took it for text, so that each byte above 127 became two. The \
          two are read as the one that they stand for."
+    VENDOR_COMMAND = 120 "H0120" Warning "vendor command with `!`"
+        "Engravers and mills (Roland, Gravograph) have commands of their own that begin with `!` and two letters, for \
+         spindles, depths and the like. They are skipped with their parameters. If one of them draws, its ink is missing."
     NO_PEN_SELECTED = 201 "H0201" Warning "no pen selected"
         "The file draws before any SP selects a pen. A plotter without a pen draws nothing; what is meant is the pen \
          that is in the holder, so that pen 1 is taken."

@@ -4,11 +4,12 @@
 use nom::Parser as _;
 use nom::branch::alt;
 use nom::bytes::complete::{take, take_while, take_while_m_n, take_while1};
-use nom::combinator::{eof, map, map_opt, not, peek, value, verify};
+use nom::character::complete::char;
+use nom::combinator::{eof, map, map_opt, not, peek, recognize, value, verify};
 use nom::multi::many0_count;
-use nom::sequence::{pair, preceded};
+use nom::sequence::{pair, preceded, terminated};
 
-use super::bytes::{Class, class, one};
+use super::bytes::{Class, class, one, unread};
 use super::{Input, Parsed, mismatch};
 use crate::mnemonic::Mnemonic;
 
@@ -101,6 +102,14 @@ pub(crate) fn parted_name(input: Input<'_>) -> Parsed<'_, (Mnemonic, Form)> {
         form_of(mnemonic).map(|form| (mnemonic, form))
     })
     .parse(input)
+}
+
+/// `vendor-command = "!" ( name - "IN" ) unread`: a command of engravers and mills.
+///
+/// `!IN` begins files that have a stray `!` before everything else.
+pub(crate) fn vendor_command(input: Input<'_>) -> Parsed<'_, Input<'_>> {
+    let own_name = verify(name, |mnemonic| mnemonic.0 != *b"IN");
+    terminated(recognize((char('!'), own_name)), unread).parse(input)
 }
 
 /// `word = letter { letter }`. More than 64 letters are two words, so that a long run is not looked

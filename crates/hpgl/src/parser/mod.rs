@@ -112,6 +112,7 @@ impl<'a> Parser<'a> {
                 });
             }
             Class::Other if self.rest.starts_with(b"@PJL") => self.language = Language::Job,
+            Class::Other if byte == b'!' && self.vendor_command() => {}
             Class::Other => {
                 self.rest = after;
                 self.report_stray(Mnemonic::NONE, start);

@@ -5,7 +5,7 @@ use drawing::Span;
 use super::state::Parser;
 use crate::codes;
 use crate::grammar::bytes::unread;
-use crate::grammar::name::{Form, form_of, name, parted_name, prose, stray_letters, word};
+use crate::grammar::name::{Form, form_of, name, parted_name, prose, stray_letters, vendor_command, word};
 use crate::mnemonic::Mnemonic;
 
 impl Parser<'_> {
@@ -57,6 +57,16 @@ impl Parser<'_> {
         self.report_unknown(Span { start, end: start + 2 });
         self.take(word);
         self.take(unread);
+    }
+
+    /// Skips a vendor's command with its parameters; false if there is none.
+    pub(super) fn vendor_command(&mut self) -> bool {
+        let Some(name) = self.take(vendor_command) else { return false };
+        self.number += 1;
+        self.report(codes::VENDOR_COMMAND, Mnemonic::NONE, self.span_of(name), || {
+            (format!("vendor command `{}` is skipped", name.escape_ascii()), None)
+        });
+        true
     }
 
     fn report_unknown(&mut self, span: Span) {
