@@ -235,6 +235,10 @@ codes! {
     PEN_ZERO_DRAWS = 228 "H0228" Note "pen 0 with a colour"
         "Pen 0 is no pen on a pen plotter. On a plotter with a palette it is a colour like any other: white, until PC makes it \
          another one, as AutoCAD's driver does. Then it is drawn, with the first pen number that the file does not use."
+    WHITE_PEN = 229 "H0229" Warning "white pen draws"
+        "PC gives a pen the colour white, and the pen draws. Printers use white to erase ink or to draw nothing; a pen \
+         plotter has no white ink, so that the pen in its place would draw over the rest. The ink is in the drawing. If \
+         it is not wanted, remove the pen from the file."
 }
 
 #[cfg(test)]

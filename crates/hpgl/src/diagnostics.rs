@@ -97,10 +97,15 @@ impl Findings {
     pub(crate) fn recode(&mut self, from: Code, to: Code, message: impl FnOnce() -> String) {
         let Some(first) = self.found.iter().position(|diagnostic| diagnostic.code == from) else { return };
         let count = self.found.iter().filter(|diagnostic| diagnostic.code == from).map(|d| d.count).sum();
-        let diagnostic = &mut self.found[first];
-        *diagnostic =
-            Diagnostic { code: to, severity: to.severity(), message: message(), count, ..diagnostic.clone() };
+        let merged = Diagnostic {
+            code: to,
+            severity: to.severity(),
+            message: message(),
+            count,
+            ..self.found[first].clone()
+        };
         self.found.retain(|diagnostic| diagnostic.code != from);
+        self.found.insert(first, merged);
         self.by_kind.clear();
     }
 

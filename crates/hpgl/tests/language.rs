@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::check;
+use common::{check, codes, document};
 
 #[test]
 fn open_comment_ends_at_semicolon() {
@@ -22,4 +22,19 @@ fn vendor_commands_are_skipped_whole() {
     check(b"IN;SP1;!PZ-20,40;!mc1PD400,0;", &["1: 0,0 400,0"], &["H0120"]);
     // A stray `!` before a file is no command.
     check(b"!IN;SP1;PD400,0;", &["1: 0,0 400,0"], &["H0102"]);
+}
+
+#[test]
+fn white_pens_are_reported() {
+    let white = document(b"IN;NP8;PC3,255,255,255;SP1;PU0,0;PD1000,0;SP3;PU0,200;FT1;RR800,400;PU;SP0;");
+    assert_eq!(codes(&white), ["H0229"]);
+    assert_eq!(white.diagnostics[0].message, "pen 3 is white (PC), but its ink is drawn");
+    let two = document(b"IN;PC3,255,255,255;PC4,255,255,255;SP3;PD9,0;SP4;PD0,9;");
+    assert_eq!(two.diagnostics[0].message, "pens 3, 4 are white (PC), but their ink is drawn");
+    // In the range that CR sets; not once the pen has another colour, or its default one.
+    assert_eq!(codes(&document(b"IN;CR0,1,0,1,0,1;PC3,1,1,1;SP3;PD400,0;")), ["H0229"]);
+    check(b"IN;PC1,255,255,255;PC1,255,0,0;SP1;PD400,0;", &["1: 0,0 400,0"], &[]);
+    check(b"IN;PC1,255,255,255;PC1;SP1;PD400,0;", &["1: 0,0 400,0"], &[]);
+    check(b"PC1,255,255,255;IN;SP1;PD400,0;", &["1: 0,0 400,0"], &[]);
+    check(b"IN;PC1,255,255,255;SP1;PU400,0;", &[], &[]);
 }

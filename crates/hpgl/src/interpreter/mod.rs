@@ -275,6 +275,7 @@ impl Interpreter {
             b"PW" => self.pen_width(p),
             b"WU" => self.width_unit(p),
             b"PC" => self.pen_colour(p),
+            b"CR" => self.colour_range(p),
             // They have no effect on ink but that line patterns begin anew.
             b"LA" | b"RF" | b"TR" => self.apply_line_type(),
             b"SP" => self.select_pen(p),
@@ -400,6 +401,7 @@ impl Interpreter {
             self.pages.push(Page { drawing: Drawing { strokes }, pens: self.pens.take_used() });
         }
         self.settle_ink_of_no_pen();
+        self.name_white_pens();
         self.report_pages();
         self.note_profile();
         let profile = self.profile.unwrap_or_default();

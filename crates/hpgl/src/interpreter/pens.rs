@@ -20,6 +20,24 @@ pub(crate) struct Pens {
     noted: bool,
     /// The file gives pen 0 a colour: it is a pen like the others.
     pub(super) zero_draws: bool,
+    palette: Palette,
+    /// Pens that were white when they drew.
+    white_drawn: BTreeSet<Pen>,
+}
+
+/// The colours of pens, as far as they matter: which are white.
+#[derive(Clone, Debug, PartialEq)]
+struct Palette {
+    /// Red, green and blue of white (`CR`).
+    white: [f64; 3],
+    /// Pens that `PC` makes white.
+    white_pens: BTreeSet<Pen>,
+}
+
+impl Default for Palette {
+    fn default() -> Self {
+        Self { white: [255.0; 3], white_pens: BTreeSet::new() }
+    }
 }
 
 impl Pens {
@@ -81,6 +99,7 @@ impl Interpreter {
             && let PenSelection::Holds(pen) = self.pen_selection
         {
             self.pens.note(Pen(pen));
+            self.report_white_pen(Pen(pen));
         }
     }
 
@@ -115,18 +134,60 @@ impl Interpreter {
         self.apply_line_type();
     }
 
-    /// `PC`: a colour of the palette. It matters for pen 0 only, whose colour is that of the paper
-    /// by default.
+    /// `CR`: the values of red, green and blue that are black and white.
+    pub(super) fn colour_range(&mut self, p: &[f64]) {
+        self.pens.palette.white = match *p {
+            [_, red, _, green, _, blue, ..] => [red, green, blue],
+            _ => Palette::default().white,
+        };
+    }
+
+    /// `PC`: a colour of the palette. It matters only whether it is white, the colour of the paper, as
+    /// that of pen 0 is by default.
     pub(super) fn pen_colour(&mut self, p: &[f64]) {
-        const WHITE: f64 = 255.0;
-        if let [0.0, red, green, blue, ..] = *p
-            && red.min(green).min(blue) < WHITE
-        {
-            self.pens.zero_draws = true;
-            if self.pen_selection == PenSelection::Empty {
-                self.hold(0);
+        let palette = &mut self.pens.palette;
+        let white = palette.white;
+        let is_white = |colour: &[f64]| colour.iter().zip(white).all(|(value, white)| *value >= white);
+        match *p {
+            [] => palette.white_pens.clear(),
+            [pen, ..] if !(0.0..=f64::from(u16::MAX)).contains(&pen) => {}
+            [0.0, red, green, blue, ..] => {
+                if !is_white(&[red, green, blue]) {
+                    self.pens.zero_draws = true;
+                    if self.pen_selection == PenSelection::Empty {
+                        self.hold(0);
+                    }
+                }
+            }
+            [pen, red, green, blue, ..] if is_white(&[red, green, blue]) => {
+                palette.white_pens.insert(Pen(pen as u16));
+            }
+            [pen, ..] => {
+                palette.white_pens.remove(&Pen(pen as u16));
             }
         }
+        self.pens.touch();
+    }
+
+    /// The default palette again.
+    pub(super) fn reset_palette(&mut self) {
+        self.pens.palette = Palette::default();
+    }
+
+    /// Reports that a pen draws which is white.
+    fn report_white_pen(&mut self, pen: Pen) {
+        if self.pens.palette.white_pens.contains(&pen) && self.pens.white_drawn.insert(pen) {
+            self.report(codes::WHITE_PEN, String::new);
+        }
+    }
+
+    /// Names all white pens in the diagnostic about them.
+    pub(super) fn name_white_pens(&mut self) {
+        let pens: Vec<String> = self.pens.white_drawn.iter().map(|pen| pen.0.to_string()).collect();
+        self.findings.recode(codes::WHITE_PEN, codes::WHITE_PEN, || match &pens[..] {
+            [pen] => format!("pen {pen} is white (PC), but its ink is drawn"),
+            _ => format!("pens {} are white (PC), but their ink is drawn", pens.join(", ")),
+        });
     }
 
     /// Gives what pen 0 drew to the first pen that draws nothing else.

@@ -32,6 +32,7 @@ impl Interpreter {
         self.ticks = Ticks::default();
         self.characters = Characters::default();
         self.symbol = None;
+        self.reset_palette();
         self.tracer.set_dashes(None);
         self.frame.initialise();
         self.tracer.set_clip(self.frame.clip());
