@@ -304,18 +304,196 @@ fn send_reads_plans_and_firmware_formats() {
 }
 
 #[test]
-fn pen_change_awaits_operator() {
+fn pen_changes_are_named_and_await_the_operator() {
     let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;SP2;PU100,200;PD300,200;PU;");
     let plan = desk.plan();
     let device = desk.device("gcode", "tty", &["--speedup", SPEEDUP]);
     let mut sender = desk.send("gcode", "tty", &[]);
     let mut sender = sender.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
-    std::io::Write::write_all(&mut sender.stdin.take().expect("its input"), b"\n").expect("it takes Enter");
+    std::io::Write::write_all(&mut sender.stdin.take().expect("its input"), b"\n\n").expect("it takes Enter");
     let output = sender.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success() && said.contains("waits for a pen change"), "{said}");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{stderr}");
+    for pen in ["put in pen 1", "put in pen 2"] {
+        assert!(stderr.contains(&format!("the machine waits for a pen change: {pen}")), "{stderr}");
+    }
     let wanted: Lines = wanted("gcode", &plan).into_iter().map(|(_, line)| (1, line)).collect();
     assert_eq!(device.ink(), wanted);
+}
+
+/// Reads lines until one contains `text`.
+fn await_line(reader: &mut impl std::io::BufRead, text: &str) {
+    let mut seen = String::new();
+    while !seen.lines().last().is_some_and(|line| line.contains(text)) {
+        assert!(reader.read_line(&mut seen).expect("text") > 0, "no {text} in {seen}");
+    }
+}
+
+#[test]
+fn pause_key_pauses_at_the_next_pen_up() {
+    let desk = Desk::new(DRAWING);
+    let plan = desk.plan();
+    thread::scope(|scope| {
+        for protocol in PROTOCOLS {
+            let (desk, plan) = (&desk, &plan);
+            scope.spawn(move || {
+                let name = format!("tty-pause-{protocol}");
+                let device = desk.device(protocol, &name, &["--speedup", "2"]);
+                let mut sender = desk.send(protocol, &name, &[]);
+                let mut sender =
+                    sender.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program runs");
+                let mut keys = sender.stdin.take().expect("its input");
+                let mut stderr = BufReader::new(sender.stderr.take().expect("its messages"));
+                std::io::Write::write_all(&mut keys, b"p").expect("a key");
+                await_line(&mut stderr, "paused with the pen up");
+                std::io::Write::write_all(&mut keys, b"p").expect("a key");
+                await_line(&mut stderr, "sent ");
+                assert!(sender.wait().expect("it ends").success(), "{protocol}");
+                assert_eq!(device.ink(), wanted(protocol, plan), "{protocol}");
+            });
+        }
+    });
+}
+
+#[test]
+fn servo_and_z_pens_through_send() {
+    let desk = Desk::new(DRAWING);
+    let plan = desk.plan();
+    let settings: [(&str, &[&str]); 5] = [
+        ("ebb", &["--pen-by", "servo"]),
+        ("ebb", &["--pen-positions", "20000,9000"]),
+        ("ebb", &["--stepper-moves"]),
+        ("gcode", &["--pen-by", "z"]),
+        ("gcode", &["--pen-by", "servo", "--pen-positions", "10,70"]),
+    ];
+    thread::scope(|scope| {
+        for (number, (protocol, options)) in settings.into_iter().enumerate() {
+            let (desk, plan) = (&desk, &plan);
+            scope.spawn(move || {
+                let name = format!("tty-pen-{number}");
+                let device = desk.device(protocol, &name, &["--speedup", SPEEDUP]);
+                let output = desk.send(protocol, &name, options).output().expect("the program runs");
+                let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+                assert!(output.status.success(), "{protocol} {options:?}: {stderr}");
+                assert_eq!(device.ink(), wanted(protocol, plan), "{protocol} {options:?}");
+            });
+        }
+    });
+}
+
+#[test]
+fn small_receive_buffers_and_announced_room() {
+    let desk = Desk::new(DRAWING);
+    let plan = desk.plan();
+    for (name, options) in
+        [("tty-64", &["--buffer", "64"][..]), ("tty-room", &["--buffer", "64", "--announce-room"])]
+    {
+        let options = [&["--speedup", SPEEDUP], options].concat();
+        let device = desk.device("ticks", name, &options);
+        desk.good(&["send", "plan.ticks", "--protocol", "ticks", "--port", name]);
+        assert_eq!(device.ink(), wanted("ticks", &plan), "{options:?}");
+    }
+}
+
+#[test]
+fn ports_are_serial_devices() {
+    let desk = Desk::new("IN;SP1;PU100,100;PD104,100;PU;");
+    std::fs::write(desk.path("notes.txt"), "keep this").expect("a file can be written");
+    for port in ["notes.txt", "/dev/null", ".", "nosuch", "tcp:localhost", "tcp:127.0.0.1:1"] {
+        let output = desk.send("raw", port, &[]).output().expect("the program runs");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{port}: {stderr}");
+        assert!(stderr.contains(&format!("cannot open {port}")), "{stderr}");
+    }
+    assert_eq!(std::fs::read(desk.path("notes.txt")).expect("a file"), b"keep this");
+}
+
+/// A port at whose other end nobody reads or answers.
+fn silent_port() -> (serialport::TTYPort, String) {
+    let (ours, theirs) = serialport::TTYPort::pair().expect("a pseudo-terminal");
+    let name = serialport::SerialPort::name(&theirs).expect("a name");
+    std::mem::forget(theirs);
+    (ours, name)
+}
+
+/// Sends a signal and gives how long the process takes to end, and what it printed.
+fn end_with(signal: &str, child: Child) -> (Duration, Output) {
+    #[allow(clippy::disallowed_methods, reason = "it is about time")]
+    let begun = std::time::Instant::now();
+    let done = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+    assert!(done.success());
+    let output = child.wait_with_output().expect("it ends");
+    (begun.elapsed(), output)
+}
+
+#[test]
+fn signals_end_commands_within_half_a_second() {
+    let desk = Desk::new(DRAWING);
+    for protocol in ["ticks", "xy-serial", "gcode", "ebb", "raw"] {
+        for signal in ["-INT", "-TERM"] {
+            // Nobody answers; with raw the port takes no more bytes.
+            let (_ours, name) = silent_port();
+            let mut sender = desk.send(protocol, &name, &[]);
+            let sender = sender.stderr(Stdio::piped()).spawn().expect("the program runs");
+            thread::sleep(Duration::from_millis(700));
+            let (took, output) = end_with(signal, sender);
+            let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(130), "{protocol} {signal}: {stderr}");
+            assert!(took < Duration::from_millis(500), "{protocol} {signal}: {took:?}");
+            assert!(stderr.contains("acknowledged nothing"), "{protocol} {signal}: {stderr}");
+            assert!(!stderr.contains("with the pen up"), "{protocol} {signal}: {stderr}");
+        }
+    }
+    let mut device = desk.device("ticks", "tty", &[]);
+    let done = Command::new("kill").args(["-TERM", &device.child.id().to_string()]).status();
+    assert!(done.expect("kill runs").success());
+    thread::sleep(Duration::from_millis(450));
+    assert!(device.child.try_wait().expect("a child").is_some_and(|status| status.success()));
+}
+
+#[test]
+fn tcp_port() {
+    use std::io::{Read as _, Write as _};
+
+    let desk = Desk::new("IN;SP1;PU100,100;PD300,100;PU;");
+    let plan = desk.plan();
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = format!("tcp:{}", listener.local_addr().expect("an address"));
+    let start = plan.rows[0].ticks;
+    let server = thread::spawn(move || {
+        let options = backends::EmulatorOptions { start: Some(start), ..Default::default() };
+        let mut device = backends::find("ticks").expect("ticks").emulator(&options).expect("an emulator");
+        let (mut stream, _) = listener.accept().expect("a sender");
+        stream.set_read_timeout(Some(Duration::from_millis(2))).expect("a timeout");
+        #[allow(clippy::disallowed_methods, reason = "it runs in time")]
+        let begun = std::time::Instant::now();
+        let mut buffer = [0; 256];
+        loop {
+            let received = match stream.read(&mut buffer) {
+                Ok(0) => return device.ink().lines(),
+                Ok(count) => count,
+                Err(_) => 0,
+            };
+            let now_us = begun.elapsed().as_micros() as u64 * 10;
+            device.receive(&buffer[..received], now_us);
+            let _ = stream.write_all(&device.answers().concat());
+        }
+    });
+    desk.good(&["send", "plan.ticks", "--protocol", "ticks", "--port", &port]);
+    // The lines are acknowledged before the last ones are executed; the server sees the end of the connection.
+    let drawn = server.join().expect("the server ends");
+    let wanted = wanted("ticks", &plan);
+    assert_eq!(drawn.first().map(|line| line.1[0]), wanted.first().map(|line| line.1[0]));
+}
+
+#[test]
+fn old_command_words_are_accepted() {
+    let desk = Desk::new("IN;SP1;PU100,100;PD104,100;PU;");
+    let arguments = ["device", "--protocol", "ticks", "--haste", "0", "--rest", "1s"];
+    let output = desk.command(&arguments).output().expect("the program runs");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("--speedup must be a positive number"), "{stderr}");
 }
 
 #[test]

@@ -264,7 +264,7 @@ pub struct EncodeOptions {
 /// How a program is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SessionOptions {
-    /// Lines or bytes in transit at once; the firmware's own default if `None`.
+    /// Lines or bytes in transit at most; the session's own limit if `None`.
     pub window: Option<usize>,
     /// How long before its time a line is sent, where the sender keeps the plan's time, microseconds.
     pub lead_us: u64,
@@ -279,6 +279,10 @@ pub struct EmulatorOptions {
     pub homed: bool,
     /// A machine that acknowledges before it arrives does so within this distance, mm; 0 for an ideal one.
     pub answers_within_mm: f64,
+    /// Size of the receive buffer, bytes, of a machine that may have another than its own.
+    pub buffer: Option<usize>,
+    /// Whether it announces the room in its receive buffer.
+    pub announces_room: bool,
 }
 
 /// The frame of an emulated machine's ink.

@@ -1,4 +1,5 @@
-//! The command file of seed 1's coaxial arm: one command a line, each a bracketed list of quoted strings.
+//! The command file of the coaxial arm (report 1 in docs/references.md): one command a line, each a
+//! bracketed list of quoted strings.
 //!
 //! ```text
 //! ['IN;1; 0x0']
@@ -8,11 +9,11 @@
 //! ```
 //!
 //! The first string is a mnemonic and the number of points; a point is the ticks of both motors, or in the other form
-//! inches, y counted down from the sheet's upper edge. The firmware means something else by it than HP-GL does:
-//! `PU` goes to its point with the pen as it is and lifts there; `PD` goes to its first point with the pen as it is,
-//! lowers it, and traces the others but never the last. So the pen is lifted in place, travel is a `PU` of its own, and
-//! a stroke's last point stands twice. Between points each motor runs for itself: points are so close that wherever
-//! both motors move, the slower one goes by a single tick.
+//! inches, y down from the sheet's upper edge. The semantics differ from HP-GL: `PU` moves to its point
+//! with the pen as it is and lifts there; `PD` moves to its first point with the pen as it is, lowers
+//! it, and traces the others but never the last. So the pen is lifted in place, travel is a `PU` of its
+//! own, and a stroke's last point is written twice. Between points the motors move independently:
+//! wherever both move, points are close enough that the slower one moves by a single tick.
 
 use std::io::Write;
 
@@ -91,7 +92,7 @@ struct Place {
 /// Writes the form in ticks.
 ///
 /// # Errors
-/// Whatever the writer says.
+/// An error of the writer.
 fn write_ticks<W: Write + ?Sized>(
     setpoints: impl IntoIterator<Item = Setpoint>,
     out: &mut W,
@@ -104,7 +105,7 @@ fn write_ticks<W: Write + ?Sized>(
 /// Writes the form in inches, for a sheet whose upper left corner is at `corner`, machine mm.
 ///
 /// # Errors
-/// Whatever the writer says.
+/// An error of the writer.
 fn write_inches<W: Write + ?Sized>(
     setpoints: impl IntoIterator<Item = Setpoint>,
     corner: Point,

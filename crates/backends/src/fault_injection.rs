@@ -1,24 +1,24 @@
-//! A wire on which things go wrong, at a certain answer or at a certain time.
+//! A wire with faults at given answers, bytes or times.
 
 use std::collections::VecDeque;
 
 use crate::device::Device;
 
-/// What goes wrong.
+/// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The machine's answer of this number, from 0, never comes.
+    /// The machine's answer of this number, from 0, is lost.
     LostAnswer(u64),
-    /// That answer, and whatever comes after it, comes so much later, microseconds.
+    /// That answer and those after it are delayed by this time, microseconds.
     LateAnswer(u64, u64),
-    /// That answer comes with other characters in it.
+    /// That answer is garbled.
     GarbledAnswer(u64),
-    /// From this time on the machine takes nothing out of its buffer for so long, microseconds.
+    /// From this time the machine takes nothing out of its buffer, for this long, microseconds.
     FullBuffer(u64, u64),
-    /// From this time on the wire is away for so long, microseconds: what is on it is lost, in both directions. The machine
-    /// keeps its power and does what it was told.
+    /// From this time the wire is unplugged, for this long, microseconds: everything in transit is lost. The machine keeps its
+    /// power and executes what it received.
     Unplugged(u64, u64),
-    /// The byte of this number that the sender sends comes with a bit changed.
+    /// One bit of the sent byte of this number is flipped.
     GarbledByte(u64),
 }
 
@@ -39,7 +39,7 @@ impl std::fmt::Debug for FaultInjector {
 }
 
 impl FaultInjector {
-    /// With these faults to come.
+    /// A machine behind a wire with these faults.
     pub fn new(device: Box<dyn Device>, faults: Vec<Fault>) -> Self {
         Self { device, faults, answered: 0, received: 0, wire: VecDeque::new() }
     }
@@ -49,7 +49,7 @@ impl FaultInjector {
         &*self.device
     }
 
-    /// Whether the wire is there.
+    /// Whether the wire is plugged in.
     pub fn plugged(&self, now_us: u64) -> bool {
         !self
             .faults
@@ -57,7 +57,7 @@ impl FaultInjector {
             .any(|fault| matches!(fault, Fault::Unplugged(at, lasts) if (*at..at + lasts).contains(&now_us)))
     }
 
-    /// Time has come so far.
+    /// Advances the clock.
     pub fn advance(&mut self, now_us: u64) {
         for fault in &self.faults {
             if let Fault::FullBuffer(at, lasts) = fault
@@ -90,7 +90,7 @@ impl FaultInjector {
                 }
             }
             if !lost {
-                // Answers come in the order in which they were given.
+                // Answers keep their order.
                 let heard_us = self.wire.back().map_or(heard_us, |(before, _)| heard_us.max(*before));
                 self.wire.push_back((heard_us, answer));
             }
@@ -116,7 +116,7 @@ impl FaultInjector {
         self.collect(now_us);
     }
 
-    /// What the sender hears now.
+    /// The bytes that the sender receives now.
     pub fn heard(&mut self, now_us: u64) -> Vec<u8> {
         let mut bytes = Vec::new();
         while self.wire.front().is_some_and(|(heard_us, _)| *heard_us <= now_us) {
@@ -125,7 +125,7 @@ impl FaultInjector {
         bytes
     }
 
-    /// When something happens next by itself.
+    /// When something next happens without input.
     pub fn wake_us(&self, now_us: u64) -> Option<u64> {
         let faults = self.faults.iter().flat_map(|fault| match fault {
             Fault::FullBuffer(at, lasts) | Fault::Unplugged(at, lasts) => vec![*at, at + lasts],

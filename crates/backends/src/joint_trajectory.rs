@@ -54,7 +54,7 @@ impl Backend for JointTrajectory {
 /// Writes a plan. `names` are the joints', `angles` tells which of them are angles.
 ///
 /// # Errors
-/// Whatever the writer says.
+/// An error of the writer.
 fn write<W: Write + ?Sized>(
     setpoints: &[Setpoint],
     names: [&str; 2],

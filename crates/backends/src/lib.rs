@@ -38,7 +38,7 @@ pub use fault_injection::{Fault, FaultInjector};
 pub use ink::Ink;
 pub use position_query::{PositionQuery, ReportedPosition};
 pub use program::{Line, Program, ProgramError};
-pub use session::{Outcome, Progress, Session};
+pub use session::{Outcome, Progress, Session, Waiting};
 pub use setpoint::Setpoint;
 
 /// Every backend, in the order of the command line's help.

@@ -18,6 +18,8 @@ pub struct Line {
     pub duration_us: u64,
     /// Position that the machine reports after it, in the unit of its reports; `None` if the line does not move.
     pub position: Option<[i64; 2]>,
+    /// A comment for the operator, shown where the machine pauses at this line.
+    pub comment: String,
 }
 
 /// Lines that a machine may have executed without an acknowledgement having arrived.
@@ -216,6 +218,15 @@ impl EncodedTable {
         rows.into_iter().find(|(row, _)| at(row) == position).map(|(_, index)| index)
     }
 
+    /// Whether the first `lines` lines end with the rest in which the pen is lifted.
+    fn is_lifted_after(&self, lines: usize) -> bool {
+        let Some(&row) = self.reached.get(lines - 1) else { return false };
+        let rows = &self.table.rows;
+        row >= 2
+            && [rows[row - 2].pen != 0, rows[row - 1].pen == 0, rows[row].pen == 0] == [true; 3]
+            && rows[row - 1].ticks == rows[row].ticks
+    }
+
     /// As [`Program::stop_sequence`]; `sent` is not empty.
     fn stop_sequence(&self, sent: &[Line]) -> Result<(Vec<Line>, u64), ProgramError> {
         let last = self.reached.get(sent.len() - 1).or(self.reached.last()).copied().unwrap_or(0);
@@ -312,7 +323,7 @@ impl Program {
                 lift.map(|line| Line { row, ..line }).collect()
             }
             Source::Language(language) => {
-                let line = |text| Line { text, row, duration_us: LIFT_US, position: None };
+                let line = |text| Line { text, row, duration_us: LIFT_US, ..Line::default() };
                 language.lift().into_iter().map(line).collect()
             }
             Source::Opaque => Vec::new(),
@@ -330,6 +341,24 @@ impl Program {
         };
         // Rows stretched in time may no longer fit the firmware's clock: then the pen at least goes up.
         stop.unwrap_or_else(|| (self.lift(sent), last.row))
+    }
+
+    /// The smallest number of lines, at least `sent`, after which the pen is up and the motors are at rest: where a sender
+    /// may pause. `None` if only the end of the program is such a place.
+    pub fn next_pen_up(&self, sent: usize) -> Option<usize> {
+        (sent.max(1)..self.lines.len()).find(|lines| self.is_pen_up_after(*lines))
+    }
+
+    fn is_pen_up_after(&self, lines: usize) -> bool {
+        match &self.source {
+            Source::Table(table) => table.is_lifted_after(lines),
+            Source::Language(language) => {
+                let lift = language.lift();
+                let last = &self.lines[lines.saturating_sub(lift.len())..lines];
+                !lift.is_empty() && last.iter().map(|line| &line.text).eq(&lift)
+            }
+            Source::Opaque => false,
+        }
     }
 
     /// Replaces everything after the first `sent` lines by the stop sequence; the row where the machine then is.

@@ -1,7 +1,8 @@
 //! Rows of position, velocity and time, for servo drives with PVT interpolation and for loops with velocity feed-forward.
 //!
-//! A drive moves along the cubic that has both positions and both velocities (Hermite). Velocities are central differences of
-//! the positions before rounding, in ticks/s, and 0 where the motors rest; so the cubics join with equal velocities.
+//! A drive moves along the cubic with both positions and both velocities (Hermite). Velocities are
+//! central differences of the exact positions, ticks/s, and 0 at rest; so the cubics join with equal
+//! velocities.
 
 use std::io::Write;
 
@@ -47,7 +48,7 @@ impl Backend for Pvt {
 /// Writes a plan: a line of column names, then one line a row. `names` are the motors'.
 ///
 /// # Errors
-/// Whatever the writer says.
+/// An error of the writer.
 fn write<W: Write + ?Sized>(setpoints: &[Setpoint], names: [&str; 2], out: &mut W) -> Result<(), WriteError> {
     let mut text = Text::new(out);
     text.str("t_s,pen");

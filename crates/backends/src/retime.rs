@@ -1,20 +1,20 @@
-//! The same rows at another speed: coming to rest anywhere in a plan, and setting out again from there.
+//! Retiming: decelerating to rest anywhere in a plan (feed hold), and accelerating again from there (cycle start).
 //!
-//! A plan's rows say where the motors are at each period. Followed at a share `u` of their speed, they keep to the same
-//! places; the motors' speeds are multiplied by `u`, their accelerations by `u²`, and a change of `u` adds what
-//! it takes. From row to row `u` changes as much as the limits in the plan's header allow:
+//! At a fraction `u` of the planned speed the motors pass the same positions; their speeds are multiplied by `u`, their
+//! accelerations by `u²`, and a change of `u` adds to them. From row to row `u` changes as much as the limits in the
+//! plan's header allow:
 //!
 //! ```text
 //! |v_k - v_(k-1)| <= a T_k + 2 / T_k        v = u d / T,  T_k = T / u
 //! ```
 //!
-//! per motor, the last term being what rounding to whole ticks can pretend.
+//! per motor; the last term is the quantization error of whole ticks.
 
 use plan::{Header, Row, TickTable};
 
-/// Shares of the plan's speed that are tried.
+/// Fractions of the planned speed that are tried.
 const SHARES: u32 = 64;
-/// No interval is drawn out further than this share.
+/// The smallest fraction.
 const SLOWEST: f64 = 1.0 / SHARES as f64;
 
 /// How fast the motors were over the interval before, ticks/s.
@@ -73,7 +73,7 @@ pub(crate) fn decelerate(table: &TickTable, at: usize) -> Vec<(usize, u64)> {
     way
 }
 
-/// Rows after row `at` to the plan's end, setting out from rest, each with its index and how long it takes to get there.
+/// Rows after row `at` to the plan's end, accelerating from rest, each with its index and how long it takes to get there.
 pub(crate) fn accelerate(table: &TickTable, at: usize) -> Vec<(usize, u64)> {
     let (header, rows) = (&table.header, &table.rows);
     let mut before = [0.0; 2];

@@ -21,6 +21,8 @@ pub struct Progress {
     pub retransmitted: u64,
     /// Position queries sent.
     pub queries: u64,
+    /// Whether the machine has acknowledged anything; without that, `lines` and `done_us` count what was sent.
+    pub acknowledged: bool,
 }
 
 impl Progress {
@@ -36,6 +38,7 @@ impl Progress {
             last_sent_row,
             retransmitted: 0,
             queries: 0,
+            acknowledged: acked > 0,
         }
     }
 }
@@ -61,6 +64,15 @@ pub enum Outcome {
     },
 }
 
+/// What a session waits for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Waiting {
+    /// The machine pauses for the operator. The text is the program's comment, such as `put in pen 2`.
+    Machine(String),
+    /// The operator paused; the pen is up.
+    Operator,
+}
+
 /// A session with one machine.
 pub trait Session {
     /// Processes bytes from the machine.
@@ -73,12 +85,12 @@ pub trait Session {
     fn stop(&mut self, now_us: u64);
     /// The port is open again after it was away: everything in transit is lost.
     fn reconnected(&mut self, now_us: u64);
-    /// Whether the machine has paused until the operator confirms a pen change.
-    fn awaiting_operator(&self) -> bool {
-        false
-    }
-    /// The operator confirmed the pen change.
-    fn resume(&mut self) {}
+    /// Requests a pause at the next place where the pen is up and the motors are at rest.
+    fn pause(&mut self);
+    /// What the session waits for, if it waits for the operator.
+    fn waiting_for(&self) -> Option<Waiting>;
+    /// The operator confirmed.
+    fn resume(&mut self, now_us: u64);
     /// How far it has come.
     fn progress(&self) -> Progress;
     /// How it ended, once it has.

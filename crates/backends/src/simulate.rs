@@ -40,8 +40,8 @@ pub fn run(
         }
         let mut sent_any = false;
         // The operator changes the pen at once.
-        if session.awaiting_operator() {
-            session.resume();
+        if session.waiting_for().is_some() {
+            session.resume(now_us);
         }
         if plugged {
             let received = machine.heard(now_us);

@@ -5,8 +5,8 @@
 mod common;
 
 use backends::{
-    EmulatorOptions, EncodeOptions, Fault, FaultInjector, Outcome, PenActuator, PositionQuery,
-    ReportedPosition, SessionOptions, simulate,
+    EmulatorOptions, EncodeOptions, Fault, FaultInjector, Outcome, PenActuator, PositionQuery, Progress,
+    ReportedPosition, Session, SessionOptions, Waiting, simulate,
 };
 use common::{HOME, Random, Setup, backends, drawing, limits, measure, setups, small};
 use plan::{Row, TickTable};
@@ -136,7 +136,7 @@ fn stop_and_resume(setup: Setup, table: &TickTable, stop_us: u64, faults: Vec<Fa
     let rest = program.from_row(row, position).unwrap();
     let mut ink = machine.device().ink().clone();
     let (mut second, from_us) = if homed {
-        let options = EmulatorOptions { start: Some(HOME), homed: true, answers_within_mm: 0.0 };
+        let options = EmulatorOptions { start: Some(HOME), homed: true, ..EmulatorOptions::default() };
         (FaultInjector::new(setup.backend.emulator(&options).unwrap(), Vec::new()), 0)
     } else {
         (machine, ended.at_us + 1_000_000)
@@ -180,6 +180,176 @@ fn stop_during_a_fault() {
             stop_and_resume(setup, &table, stop_us, vec![fault], false);
         }
     }
+}
+
+/// A session that is paused at a time and is not resumed; pen changes are confirmed at once.
+struct Paused {
+    session: Box<dyn Session>,
+    at_us: u64,
+    /// What the machine waited for, in order.
+    waits: Vec<String>,
+}
+
+impl Session for Paused {
+    fn receive(&mut self, bytes: &[u8], now_us: u64) {
+        self.session.receive(bytes, now_us);
+    }
+
+    fn transmit(&mut self, now_us: u64) -> Vec<u8> {
+        if now_us >= self.at_us {
+            self.at_us = u64::MAX;
+            self.session.pause();
+        }
+        if let Some(Waiting::Machine(what)) = self.session.waiting_for() {
+            self.waits.push(what);
+            self.session.resume(now_us);
+        }
+        self.session.transmit(now_us)
+    }
+
+    fn wake_us(&self) -> Option<u64> {
+        self.session.wake_us().into_iter().chain((self.at_us != u64::MAX).then_some(self.at_us)).min()
+    }
+
+    fn stop(&mut self, now_us: u64) {
+        self.session.stop(now_us);
+    }
+
+    fn reconnected(&mut self, now_us: u64) {
+        self.session.reconnected(now_us);
+    }
+
+    fn pause(&mut self) {
+        self.session.pause();
+    }
+
+    fn waiting_for(&self) -> Option<Waiting> {
+        None
+    }
+
+    fn resume(&mut self, now_us: u64) {
+        self.session.resume(now_us);
+    }
+
+    fn progress(&self) -> Progress {
+        self.session.progress()
+    }
+
+    fn outcome(&self) -> Option<&Outcome> {
+        self.session.outcome()
+    }
+}
+
+#[test]
+fn pause_at_the_next_pen_up_and_resume() {
+    let table = drawing();
+    for setup in setups() {
+        let (_, duration_us) = measure(setup, &table);
+        let mut pauses = 0;
+        for k in 0..40 {
+            let what = format!("{setup:?} paused at {k}/40");
+            let mut machine = FaultInjector::new(setup.device(), Vec::new());
+            let session = setup.session(setup.program(&table));
+            let mut session = Paused { session, at_us: duration_us * k / 40, waits: Vec::new() };
+            let ended = simulate::run(&mut session, &mut machine, 0, None, HOUR_US);
+            if ended.outcome.is_none() {
+                pauses += 1;
+                assert_eq!(session.session.waiting_for(), Some(Waiting::Operator), "{what}");
+                assert!(!machine.device().pen_is_down(), "{what}: the pen is down");
+                assert!(session.progress().lines < session.progress().of_lines, "{what}");
+                let resumed_us = ended.at_us + 60_000_000;
+                session.resume(resumed_us);
+                let ended = simulate::run(&mut session, &mut machine, resumed_us, None, HOUR_US);
+                assert_eq!(ended.outcome, Some(Outcome::Done), "{what}");
+            }
+            assert_eq!(machine.device().ink().lines(), setup.wanted(&table), "{what}");
+        }
+        assert!(pauses > 20, "{setup:?}: {pauses} pauses");
+    }
+}
+
+#[test]
+fn pauses_name_the_pen_and_park_the_machine() {
+    let setup = Setup::of("gcode-grbl");
+    let program = setup.program(&drawing());
+    let mut machine = FaultInjector::new(setup.device(), Vec::new());
+    let mut session = Paused { session: setup.session(program.clone()), at_us: u64::MAX, waits: Vec::new() };
+    let ended = simulate::run(&mut session, &mut machine, 0, None, HOUR_US);
+    assert_eq!(ended.outcome, Some(Outcome::Done));
+    assert_eq!(session.waits, ["put in pen 1", "put in pen 2", "put in pen 1"]);
+    // The plan starts at 76, 60 mm.
+    let lines: Vec<&str> = program.lines.iter().map(|line| line.text.as_str()).collect();
+    let pauses: Vec<usize> = (0..lines.len()).filter(|line| lines[*line] == "M0").collect();
+    assert_eq!(pauses.len(), 3);
+    for pause in &pauses[1..] {
+        assert_eq!(lines[pause - 1], "G0 X76 Y60");
+        assert!(lines[pause + 1].starts_with("G0 X"), "{}", lines[pause + 1]);
+    }
+}
+
+/// Sends a plan of 40 strokes to a reader of tick lines with this receive buffer: bytes lost, lines retransmitted.
+fn with_receive_buffer(buffer: usize, announces_room: bool) -> (u64, u64) {
+    let points: Vec<[[i64; 2]; 2]> = (0..40).map(|k| [[1000 + 10 * k, 200], [1000 + 10 * k, 500]]).collect();
+    let strokes: Vec<(u16, &[[i64; 2]])> = points.iter().map(|points| (1, &points[..])).collect();
+    let table = common::plan(&strokes);
+    let setup = Setup::of("ticks");
+    let options = EmulatorOptions {
+        start: Some(HOME),
+        buffer: Some(buffer),
+        announces_room,
+        ..EmulatorOptions::default()
+    };
+    let mut machine = FaultInjector::new(setup.backend.emulator(&options).unwrap(), Vec::new());
+    let mut session = setup.session(setup.program(&table));
+    let ended = simulate::run(&mut *session, &mut machine, 0, None, HOUR_US);
+    assert_eq!(ended.outcome, Some(Outcome::Done), "{buffer} bytes");
+    assert_eq!(machine.device().ink().lines(), setup.wanted(&table), "{buffer} bytes");
+    // Retransmissions may not cost more than a tenth of the plan's time.
+    let late_us = ended.at_us.saturating_sub(table.header.duration_us);
+    assert!(late_us < table.header.duration_us / 10, "{buffer} bytes: {late_us} us late");
+    (machine.device().lost_bytes(), session.progress().retransmitted)
+}
+
+#[test]
+fn window_adapts_to_a_receive_buffer_of_64_bytes() {
+    for buffer in [40, 64, 128, 256, 512] {
+        let (_, retransmitted) = with_receive_buffer(buffer, false);
+        assert!(retransmitted <= 60, "{buffer} bytes: {retransmitted} lines retransmitted");
+    }
+}
+
+#[test]
+fn announced_room_is_never_exceeded() {
+    for buffer in [40, 64, 128, 256, 512] {
+        assert_eq!(with_receive_buffer(buffer, true), (0, 0), "{buffer} bytes");
+    }
+}
+
+#[test]
+fn reset_machine_is_reported() {
+    let setup = Setup::of("ticks");
+    let mut session = setup.session(setup.program(&drawing()));
+    let _ = session.transmit(0);
+    session.receive(
+        b"ok 1*21
+",
+        1000,
+    );
+    assert!(!session.transmit(2000).is_empty());
+    session.receive(
+        b"ok 0*20
+",
+        3000,
+    );
+    session.receive(
+        b"ok 0*20
+",
+        4000,
+    );
+    let Some(Outcome::Failed { row: 0, why, .. }) = session.outcome() else {
+        panic!("{:?}", session.outcome())
+    };
+    assert!(why.contains("the machine was reset"), "{why}");
 }
 
 /// The machine's report, queried in memory.
@@ -338,7 +508,7 @@ fn failure_names_what_was_received() {
 fn early_acknowledgement_of_the_single_belt_plotter_cuts_corners_by_a_millimetre() {
     let table = drawing();
     let setup = Setup::of("xy-serial");
-    let options = EmulatorOptions { start: None, homed: true, answers_within_mm: 1.0 };
+    let options = EmulatorOptions { homed: true, answers_within_mm: 1.0, ..EmulatorOptions::default() };
     let mut machine = FaultInjector::new(setup.backend.emulator(&options).unwrap(), Vec::new());
     let mut session = setup.session(setup.program(&table));
     let ended = simulate::run(&mut *session, &mut machine, 0, None, HOUR_US);

@@ -330,7 +330,7 @@ pub(crate) struct Preview {
 pub(crate) struct Send {
     /// Plan to send, or for gcode, xy-serial and raw a file in the machine's own language; `-` for standard input
     pub(crate) plan: String,
-    /// Serial port
+    /// Serial device, pseudo-terminal, or tcp:HOST:PORT
     #[arg(short, long, value_name = "PATH", required_unless_present = "dry_run")]
     pub(crate) port: Option<String>,
     /// Protocol of the machine
@@ -351,7 +351,7 @@ pub(crate) struct Send {
     /// Write everything sent and received to this file
     #[arg(long, value_name = "FILE")]
     pub(crate) log: Option<String>,
-    /// For ticks: lines in transit at once [default: 8]. For gcode: size of the machine's receive buffer, bytes [default: 127]
+    /// For ticks: lines in transit at most [default: as the machine's buffer allows]. For gcode: size of the machine's receive buffer, bytes [default: 127]
     #[arg(long, value_name = "N")]
     pub(crate) window: Option<usize>,
     /// For paced: time by which lines are sent early
@@ -447,6 +447,12 @@ pub(crate) struct Emulate {
     /// End when nothing was received for this time, after something was; by the emulated clock
     #[arg(long, alias = "rest", value_name = "TIME", value_parser = time)]
     pub(crate) idle_timeout: Option<f64>,
+    /// For ticks: size of the receive buffer [default: 512]
+    #[arg(long, value_name = "BYTES")]
+    pub(crate) buffer: Option<usize>,
+    /// For ticks: announce the room in the receive buffer in the answer to line 0
+    #[arg(long)]
+    pub(crate) announce_room: bool,
     /// For xy-serial: homed before
     #[arg(long)]
     pub(crate) homed: bool,

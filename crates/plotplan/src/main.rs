@@ -6,6 +6,7 @@ mod cli;
 mod command;
 mod failure;
 mod input;
+mod keys;
 mod machines;
 mod output;
 mod port;

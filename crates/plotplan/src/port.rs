@@ -39,6 +39,8 @@ pub(crate) enum Event {
     Interrupted,
     /// The operator pressed Enter.
     Enter,
+    /// The operator pressed the key that pauses and resumes.
+    Pause,
 }
 
 /// An open port. What it receives goes to the channel that it was opened with.
@@ -194,16 +196,6 @@ impl Events {
         ctrlc::set_handler(move || {
             let _ = sender.send(Event::Interrupted);
         })
-    }
-
-    /// Delivers the next line of standard input as an event.
-    pub(crate) fn wait_for_enter(&self) {
-        let sender = self.sender.clone();
-        std::thread::spawn(move || {
-            if std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0) {
-                let _ = sender.send(Event::Enter);
-            }
-        });
     }
 
     /// The next event, if one arrives in time.

@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use backends::status::StatusProtocol;
-use backends::{Outcome, PositionQuery, Progress, ReportedPosition, Session};
+use backends::{Outcome, PositionQuery, Progress, ReportedPosition, Session, Waiting};
 
 use crate::failure::Failure;
+use crate::keys::Keys;
 use crate::port::{Event, Events, Port, Settings};
 use crate::terminal::{self, SendingProgress};
 
@@ -34,6 +35,8 @@ pub(crate) struct Wire {
     lost_at: Option<Instant>,
     /// Whether the machine has sent anything.
     heard: bool,
+    /// When SIGINT or SIGTERM arrived.
+    interrupted: Option<Instant>,
 }
 
 impl Wire {
@@ -49,7 +52,22 @@ impl Wire {
             .transpose()
             .map_err(Failure::Io)?;
         let (number, lost_at) = (0, None);
-        Ok(Self { settings, events, port: Some(port), number, log, begun: now(), lost_at, heard: false })
+        Ok(Self {
+            settings,
+            events,
+            port: Some(port),
+            number,
+            log,
+            begun: now(),
+            lost_at,
+            heard: false,
+            interrupted: None,
+        })
+    }
+
+    /// Whether SIGINT or SIGTERM arrived.
+    pub(crate) fn is_interrupted(&self) -> bool {
+        self.interrupted.is_some()
     }
 
     fn now_us(&self) -> u64 {
@@ -131,37 +149,35 @@ impl Wire {
                     return Err(Failure::Io(anyhow::anyhow!("{} was lost", self.settings.path)));
                 }
                 Some(Event::Interrupted) => return Err(Failure::Interrupted),
-                Some(Event::Enter | Event::Written) | None => {}
+                Some(Event::Enter | Event::Pause | Event::Written) | None => {}
             }
         }
     }
 
-    /// Runs the session to its end.
-    pub(crate) fn run(&mut self, session: &mut dyn Session, reconnect_s: f64) -> Outcome {
+    /// Runs the session to its end. With `keys` the operator may pause it.
+    pub(crate) fn run(&mut self, session: &mut dyn Session, reconnect_s: f64, keys: bool) -> Outcome {
         let progress = SendingProgress::new(session.progress().of_us);
-        let outcome = self.run_with(session, reconnect_s, &progress);
+        let keys = keys.then(|| Keys::listen(self.events.sender.clone()));
+        let mut operator = Operator::new(keys.as_ref().is_some_and(|keys| keys.interactive));
+        let outcome = self.run_with(session, reconnect_s, &progress, &mut operator);
         progress.finish();
         outcome
     }
 
-    fn run_with(&mut self, session: &mut dyn Session, reconnect_s: f64, shown: &SendingProgress) -> Outcome {
-        let mut interrupted: Option<Instant> = None;
+    fn run_with(
+        &mut self,
+        session: &mut dyn Session,
+        reconnect_s: f64,
+        shown: &SendingProgress,
+        operator: &mut Operator,
+    ) -> Outcome {
         let mut shown_at = self.begun;
-        let mut waiting = false;
         loop {
             if now().duration_since(shown_at) >= REOPEN_INTERVAL {
                 shown_at = now();
                 shown.show(&session.progress());
             }
-            if session.awaiting_operator() != waiting {
-                waiting = !waiting;
-                if waiting {
-                    terminal::say(
-                        "the machine waits for a pen change: insert the pen, then press Enter (or the machine's cycle start)\n",
-                    );
-                    self.events.wait_for_enter();
-                }
-            }
+            operator.watch(session, self.now_us());
             if let Some(why) = self.reconnect(session, reconnect_s) {
                 return failed(session, why);
             }
@@ -174,7 +190,7 @@ impl Wire {
                 return outcome.clone();
             }
             let silent = !self.heard || !clear;
-            if silent && interrupted.is_some_and(|at| now().duration_since(at) >= SILENT_STOP) {
+            if silent && self.interrupted.is_some_and(|at| now().duration_since(at) >= SILENT_STOP) {
                 let why = if clear { "the machine never answered" } else { "the port takes no more bytes" };
                 return failed(session, format!("interrupted; {why}"));
             }
@@ -188,12 +204,13 @@ impl Wire {
                     session.receive(&bytes, self.now_us());
                 }
                 Some(Event::Lost(number)) if number == self.number => self.lose(),
-                Some(Event::Enter) => session.resume(),
-                Some(Event::Interrupted) if interrupted.is_some() => {
+                Some(Event::Enter) => operator.confirm(session, self.now_us()),
+                Some(Event::Pause) => operator.pause(session, self.now_us()),
+                Some(Event::Interrupted) if self.interrupted.is_some() => {
                     return failed(session, "interrupted again before the machine was at rest".to_owned());
                 }
                 Some(Event::Interrupted) => {
-                    interrupted = Some(now());
+                    self.interrupted = Some(now());
                     session.stop(self.now_us());
                 }
                 Some(Event::Lost(_) | Event::Written) | None => {}
@@ -210,6 +227,64 @@ impl Wire {
             return Some(format!("{} was lost", self.settings.path));
         }
         None
+    }
+}
+
+/// The operator at the keyboard.
+struct Operator {
+    /// Whether keys are pressed when they are needed; otherwise they were written in advance and are kept.
+    interactive: bool,
+    confirmations: u32,
+    waiting: Option<Waiting>,
+    pausing: bool,
+}
+
+impl Operator {
+    fn new(interactive: bool) -> Self {
+        Self { interactive, confirmations: 0, waiting: None, pausing: false }
+    }
+
+    /// Shows what the session waits for, and confirms what was confirmed in advance.
+    fn watch(&mut self, session: &mut dyn Session, now_us: u64) {
+        let waiting = session.waiting_for();
+        if waiting != self.waiting {
+            match &waiting {
+                Some(Waiting::Machine(comment)) => {
+                    let what = if comment.is_empty() { "the operator" } else { comment };
+                    terminal::say(&format!(
+                        "the machine waits for a pen change: {what}, then press Enter (or the machine's cycle start)\n"
+                    ));
+                }
+                Some(Waiting::Operator) => terminal::say("paused with the pen up; p resumes\n"),
+                None => {}
+            }
+            self.waiting = waiting;
+        }
+        if self.waiting.is_some() && self.confirmations > 0 {
+            self.confirmations -= 1;
+            session.resume(now_us);
+        }
+    }
+
+    fn confirm(&mut self, session: &mut dyn Session, now_us: u64) {
+        if self.waiting.is_some() {
+            self.pausing = false;
+            session.resume(now_us);
+        } else if !self.interactive {
+            self.confirmations += 1;
+        }
+    }
+
+    /// Pauses at the next pen-up, or resumes.
+    fn pause(&mut self, session: &mut dyn Session, now_us: u64) {
+        self.pausing = !self.pausing;
+        if self.pausing {
+            session.pause();
+            terminal::say("pausing at the next pen-up; p resumes\n");
+        } else {
+            session.resume(now_us);
+            terminal::say("resumed\n");
+        }
     }
 }
 

@@ -1,8 +1,8 @@
-//! An EiBotBoard: commands one after the other, `OK` once there was room in the FIFO of one move, accumulators as the command
-//! reference has them.
+//! An emulated EiBotBoard: commands in order, `OK` once the FIFO of one move had room, accumulators as in the command
+//! reference.
 //!
-//! Every 40 us `Rate += Accel`, `Accumulator += Rate`, and a step when the accumulator reaches 2^31; the initial rate is lowered by
-//! half the acceleration. USB holds back what the board has no room for.
+//! Every 40 us `Rate += Accel`, `Accumulator += Rate`, and a step when the accumulator reaches 2^31; the initial rate is
+//! reduced by half the acceleration. USB flow control holds back what the board has no room for.
 
 use std::collections::VecDeque;
 
@@ -10,20 +10,20 @@ use crate::device::{Device, Port};
 
 /// Its receive buffer, bytes.
 const BUFFER: usize = 256;
-/// Moves that wait behind the one that is being done.
+/// Moves that wait behind the current one.
 const FIFO: usize = 1;
 const INTERVAL_US: u64 = 40;
-/// The real one takes 32 bits of them; this one is done with a move within the hour.
+/// The board takes 32 bits; here a move ends within the hour.
 const MOST_INTERVALS: i64 = 90_000_000;
 const FULL: i64 = 1 << 31;
 
 #[derive(Clone, Copy, Debug)]
 enum Motion {
-    /// So many intervals at these rates and accelerations, accumulators cleared by the bits.
+    /// A number of intervals at these rates and accelerations; set bits of `clear` clear accumulators first.
     Timed { intervals: u64, rates: [i64; 2], accelerations: [i64; 2], clear: u8 },
-    /// So many milliseconds, evenly.
+    /// Steps spread evenly over a time.
     Stepper { ms: u64, steps: [i64; 2] },
-    /// The pen, and a wait.
+    /// A pen move and a wait.
     Pen { down: bool, ms: u64 },
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Ebb {
     fifo: VecDeque<Motion>,
     until_us: Option<u64>,
     accumulators: [i64; 2],
-    /// Its global step counters, and how far the motors are from where they were switched on.
+    /// The global step counters, and the motors' distance from where they were switched on.
     counters: [i64; 2],
     place: [i64; 2],
     up_position: Option<i64>,
@@ -68,7 +68,7 @@ impl Ebb {
         self.port.answers.push(b"OK\r\n".to_vec());
     }
 
-    /// Each thing at its time, up to `now_us`.
+    /// Executes everything due up to `now_us`, in order.
     fn work(&mut self, now_us: u64) {
         loop {
             while self.take() || self.begin() {}
@@ -152,7 +152,7 @@ impl Ebb {
                 return true;
             }
         };
-        // One is being done, one may wait; another has to wait in the buffer.
+        // One is being executed, one may wait; another stays in the buffer.
         if self.fifo.len() > FIFO {
             return false;
         }
@@ -191,7 +191,7 @@ fn servo_position(line: &str) -> Option<i64> {
     line.strip_prefix("S2,")?.split(',').next()?.parse().ok()
 }
 
-/// What a line moves; nothing if it is a query or a setting, or why it is wrong.
+/// The motion of a line; `Err(None)` for a query or a setting, otherwise why it is wrong.
 fn motion(line: &str, up_position: Option<i64>) -> Result<Motion, Option<String>> {
     let mut words = line.split(',');
     let verb = words.next().unwrap_or_default();

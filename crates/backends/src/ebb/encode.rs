@@ -1,4 +1,4 @@
-//! Lines for an EiBotBoard (EBB): `LT` moves of firmware 2.7 and later, or `SM` moves of older ones.
+//! Lines for an EiBotBoard (EBB): `LT` moves of firmware 2.7 and later, or `SM` moves.
 //!
 //! Every 40 us the board adds a rate to each axis' accumulator and steps when that reaches 2^31; `LT,T,R1,A1,R2,A2` does so
 //! `T` times (ebb command reference, "LT"). Motors move evenly between a plan's rows, so accelerations are 0 and the rates are
@@ -7,10 +7,10 @@
 //! R = round((2^31 d + H - C) / T)
 //! ```
 //!
-//! for `d` steps in `T` intervals, `C` being what the accumulator holds and `H = 2^30` what it is to hold afterwards: steps
-//! fall where a motor passes the middle between two positions. The accumulators are followed exactly, so that no
-//! step is lost or gained, however long the plan; what rounding leaves over goes into the next move. Times are
-//! rounded to whole intervals since the start, not one by one.
+//! for `d` steps in `T` intervals, with `C` the accumulator before the move and `H = 2^30` its target afterwards: a step
+//! falls where the motor passes the midpoint between two positions. The accumulators are tracked exactly, so no step is
+//! lost or gained in a plan of any length; the rounding remainder goes into the next move. Times are rounded to whole
+//! intervals since the start, not one by one.
 
 use std::io::Write;
 
@@ -26,12 +26,12 @@ pub(super) const NAME: &str = "ebb";
 const INTERVAL_US: u64 = 40;
 /// A full accumulator: one step.
 const FULL: i64 = 1 << 31;
-/// What accumulators hold after each move, or nearly.
+/// The target of an accumulator after each move.
 const HALF: i64 = 1 << 30;
 /// Most steps a second, one an interval.
 const MOST: u64 = 25_000;
 
-/// Which commands the board's firmware knows.
+/// The move command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Moves {
     /// `LT`: firmware 2.7 and later.
@@ -40,10 +40,10 @@ pub(super) enum Moves {
     Stepper,
 }
 
-/// How the pen is moved.
+/// What moves the pen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pen {
-    /// `SP`, with the positions that the board has been told.
+    /// `SP`, with the positions set on the board.
     Toggle,
     /// `S2`, a servo output with positions of its own, in units of 1/12 us.
     Servo {
@@ -68,23 +68,23 @@ impl Pen {
     }
 }
 
-/// Makes lines of rows, one after the other.
+/// Encodes rows one after the other.
 #[derive(Clone, Debug)]
 pub(super) struct Encoder {
     moves: Moves,
     pen: Pen,
-    /// What each accumulator holds; before the first move it is told to hold nothing.
+    /// The accumulators. The first move clears them.
     accumulators: [i64; 2],
     cleared: bool,
-    /// Intervals (or milliseconds) since the start that have been said.
-    said: u64,
+    /// Intervals (or milliseconds) since the start that were written.
+    written: u64,
     clock_us: u64,
 }
 
 impl Encoder {
     /// At the start of a plan.
     pub(super) fn new(moves: Moves, pen: Pen) -> Self {
-        Self { moves, pen, accumulators: [0; 2], cleared: false, said: 0, clock_us: 0 }
+        Self { moves, pen, accumulators: [0; 2], cleared: false, written: 0, clock_us: 0 }
     }
 
     /// The lines before the first move: motors on with sixteenth steps, pen up.
@@ -92,12 +92,12 @@ impl Encoder {
         vec!["EM,1,1".to_owned(), self.pen.line(false, 500)]
     }
 
-    /// Moves the pen, and waits.
+    /// The line that moves the pen and waits.
     pub(super) fn pen(&mut self, down: bool, wait_us: u64) -> String {
         self.clock_us += wait_us;
         let unit = self.unit();
-        let ms = (self.clock_us / unit).saturating_sub(self.said) * unit / 1000;
-        self.said += ms * 1000 / unit;
+        let ms = (self.clock_us / unit).saturating_sub(self.written) * unit / 1000;
+        self.written += ms * 1000 / unit;
         self.pen.line(down, ms)
     }
 
@@ -108,11 +108,11 @@ impl Encoder {
         }
     }
 
-    /// Moves by so many steps in so many microseconds; nothing where the time is too short to be said yet and nothing
-    /// moves. `row` is the row at the end, for error messages.
+    /// The line that moves by `steps` in `duration_us`; `None` if nothing moves in less than one unit of time. `row` is the
+    /// row at the end, for error messages.
     ///
     /// # Errors
-    /// When the board cannot step so fast, or the time is too short for it.
+    /// A step rate or a duration that the board cannot execute.
     pub(super) fn go(
         &mut self,
         row: u64,
@@ -121,7 +121,7 @@ impl Encoder {
     ) -> Result<Option<String>, Unrepresentable> {
         let unit = self.unit();
         self.clock_us += duration_us;
-        let time = ((self.clock_us + unit / 2) / unit).saturating_sub(self.said);
+        let time = ((self.clock_us + unit / 2) / unit).saturating_sub(self.written);
         if time == 0 {
             if steps == [0, 0] {
                 return Ok(None);
@@ -129,7 +129,7 @@ impl Encoder {
             return Err(Unrepresentable::TooShort { row, us: duration_us, format: NAME, least: unit });
         }
         let most = steps[0].unsigned_abs().max(steps[1].unsigned_abs());
-        // Rates stay below 2^31, with room for what rounding left over.
+        // Rates stay below 2^31, with a margin for the rounding remainder.
         if u128::from(most) * 1_000_000 >= u128::from(MOST) * u128::from(time * unit) {
             return Err(Unrepresentable::TooFast {
                 row,
@@ -140,23 +140,23 @@ impl Encoder {
             });
         }
         if self.moves == Moves::Stepper {
-            self.said += time;
+            self.written += time;
             return Ok(Some(format!("SM,{time},{},{}", steps[0], steps[1])));
         }
         if steps == [0, 0] {
-            // No rate at all is no move; `SM` without steps is the board's way to wait, in whole milliseconds.
+            // A rate of 0 is no move; `SM` without steps waits, in whole milliseconds.
             let ms = time * unit / 1000;
-            self.said += ms * 1000 / unit;
+            self.written += ms * 1000 / unit;
             return Ok((ms > 0).then(|| format!("SM,{ms},0,0")));
         }
-        self.said += time;
+        self.written += time;
         let rates = [0, 1].map(|axis| self.rate(axis, steps[axis], time));
         let clear = if self.cleared { "" } else { ",3" };
         self.cleared = true;
         Ok(Some(format!("LT,{time},{},0,{},0{clear}", rates[0], rates[1])))
     }
 
-    /// The rate that makes exactly so many steps, and what the accumulator holds after them.
+    /// The rate that makes exactly `steps` steps; updates the accumulator.
     fn rate(&mut self, axis: usize, steps: i64, intervals: u64) -> i64 {
         if steps == 0 {
             return 0;
@@ -183,7 +183,7 @@ pub(super) fn lines(
     let mut lines: Vec<Line> = encoder
         .start()
         .into_iter()
-        .map(|text| Line { text, row: 0, duration_us: 0, position: None })
+        .map(|text| Line { text, row: 0, duration_us: 0, ..Line::default() })
         .collect();
     let mut before: Option<Row> = None;
     let mut down = false;
@@ -194,19 +194,19 @@ pub(super) fn lines(
             let pen_moves = (last.pen != 0) != down;
             if pen_moves {
                 down = last.pen != 0;
-                // Where the motors rest for the pen, the pen's own line waits.
+                // Where the motors are at rest for the pen, the pen's line waits.
                 let waits = if steps == [0, 0] { duration_us } else { 0 };
                 lines.push(Line {
                     text: encoder.pen(down, waits),
                     row: index - 1,
                     duration_us: waits,
-                    position: None,
+                    ..Line::default()
                 });
             }
             if !(pen_moves && steps == [0, 0])
                 && let Some(text) = encoder.go(index, steps, duration_us)?
             {
-                lines.push(Line { text, row: index, duration_us, position: None });
+                lines.push(Line { text, row: index, duration_us, ..Line::default() });
             } else if let Some(line) = lines.last_mut() {
                 line.row = index;
             }
@@ -218,7 +218,7 @@ pub(super) fn lines(
             text: encoder.pen(false, 0),
             row: lines.last().map_or(0, |c| c.row),
             duration_us: 0,
-            position: None,
+            ..Line::default()
         });
     }
     Ok(lines)
@@ -227,7 +227,7 @@ pub(super) fn lines(
 /// Writes a plan. Lines end with a carriage return, as the board wants them.
 ///
 /// # Errors
-/// As [`lines`], before anything is written; whatever the writer says.
+/// As [`lines`], before anything is written; an error of the writer.
 pub(super) fn write<W: Write + ?Sized>(
     rows: impl IntoIterator<Item = Row>,
     moves: Moves,

@@ -1,7 +1,7 @@
-//! A machine with grbl's manners: a receive buffer of 128 bytes, a planner of 15 blocks, `ok` once a line has been
-//! understood and there was room for it, `?` answered at once.
+//! An emulated grbl: a receive buffer of 128 bytes, a planner of 15 blocks, `ok` once a line is parsed and queued, `?`
+//! answered at once.
 //!
-//! It moves at the feed without accelerations, along arcs as it should. Pen: the first `S` (or `Z`) it hears of is up.
+//! It moves at the feed rate without accelerations, along true arcs. The first `S` (or `Z`) that it receives is pen up.
 
 use std::collections::VecDeque;
 
@@ -11,11 +11,11 @@ use crate::device::{Device, Port};
 const BUFFER: usize = 128;
 /// Its planner, blocks.
 const BLOCKS: usize = 15;
-/// It says where it is in whole steps.
+/// It reports positions in whole steps.
 const STEPS_PER_MM: f64 = 80.0;
 /// Rapid moves, mm/s.
 const RAPID: f64 = 100.0;
-/// Parts of an arc that are drawn as chords.
+/// Chords of an arc in the ink.
 const CHORDS: u32 = 24;
 
 #[derive(Clone, Debug)]
@@ -90,7 +90,7 @@ impl Grbl {
         self.answer(&report);
     }
 
-    /// Each thing at its time, up to `now_us`.
+    /// Executes everything due up to `now_us`, in order.
     fn work(&mut self, now_us: u64) {
         loop {
             while self.take() {}
@@ -111,7 +111,7 @@ impl Grbl {
         self.now_us = now_us;
     }
 
-    /// Reads one line if it may; whether it did.
+    /// Takes one line out of the buffer if possible; whether it did.
     fn take(&mut self) -> bool {
         if self.paused
             || self.now_us < self.dwell_us
@@ -122,14 +122,14 @@ impl Grbl {
         }
         let Some(end) = self.port.buffer.iter().position(|byte| *byte == b'\n') else { return false };
         let line = String::from_utf8_lossy(&self.port.buffer[..end]).trim().to_owned();
-        // Spindle, dwell and (here) the pen's axis wait until everything before them has been done.
+        // Spindle, dwell and (here) the pen's axis wait until all queued motion is done.
         let waits = line.starts_with('M') || line.starts_with("G4") || line.contains('Z');
         if waits && !self.blocks.is_empty() {
             return false;
         }
         self.port.buffer.drain(..=end);
         if line.split([' ', ';']).next() == Some("M0") {
-            // The answer comes when it goes on.
+            // It is acknowledged on cycle start.
             self.paused = true;
             return true;
         }
@@ -207,7 +207,7 @@ impl Grbl {
     }
 }
 
-/// Points of an arc and its length; refused as grbl does where the radii at both ends differ.
+/// Points of an arc and its length; an error, as in grbl, if the radii at both ends differ.
 fn arc(from: [f64; 2], to: [f64; 2], center: [f64; 2], clockwise: bool) -> Result<(Vec<[f64; 2]>, f64), u8> {
     let polar = |p: [f64; 2]| {
         let (x, y) = (p[0] - center[0], p[1] - center[1]);

@@ -1,10 +1,10 @@
 //! G-code for firmwares that do the kinematics themselves: the drawing as Cartesian paths in machine mm.
 //!
-//! Two ways: [`commands`] says the drawing (lines, arcs as `G2` and `G3`, the speed of each stroke as the plan has it on
-//! average) and leaves acceleration to the firmware's own planner; [`timed`] says each row of the plan with the time it
-//! takes (`G93`, inverse time). A firmware plans again in either case: times are wishes.
+//! [`paths`] writes the drawing (lines, arcs as `G2` and `G3`, the mean speed of each stroke in the plan) and leaves
+//! acceleration to the firmware's own planner; [`timed`] writes each row of the plan with its duration (`G93`, inverse
+//! time). The firmware plans velocities again in either case.
 //!
-//! Before every stroke stands a comment `; s N`: a sender may go on there, at the command with that number.
+//! A comment `; s N` precedes every stroke: a sender may resume there, at the line with that number.
 
 use std::f64::consts::PI;
 use std::io::Write;
@@ -16,7 +16,7 @@ use crate::{Line, Setpoint};
 use plan::Row;
 use plan::file::text::Text;
 
-/// Whose G-code it is.
+/// A dialect of G-code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flavour {
     /// grbl 1.1 and grblHAL.
@@ -48,38 +48,43 @@ pub(super) enum Pen {
     },
 }
 
-/// How to say things.
+/// How lines are written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Options {
-    /// Whose G-code it is.
+    /// The dialect.
     pub(super) flavour: Flavour,
     /// What moves the pen.
     pub(super) pen: Pen,
-    /// How long the pen takes to go up and to come down, s.
+    /// Lift time and drop time, s.
     pub(super) pen_s: [f64; 2],
     /// Speed of travel with the pen up, mm/s.
     pub(super) travel_mm_s: f64,
-    /// Chords of what is neither a line nor an arc of a circle stay so close to it, mm.
+    /// Chord error of curves that are neither lines nor circular arcs, mm.
     pub(super) chord_mm: f64,
 }
 
-/// An arc is cut so that no part turns further than this: firmwares are at a loss with whole circles, and lose digits.
+/// No part of a split arc turns further than this: firmwares reject full circles, and lose digits on long arcs.
 const MOST_TURN: f64 = PI / 2.0;
-/// Arcs beyond this radius, mm, are chords: `I` and `J` would lose too many digits.
+/// Arcs with a larger radius, mm, become chords: `I` and `J` would lose too many digits.
 const LARGEST_RADIUS_MM: f64 = 10_000.0;
 
 struct Program<'a> {
     options: &'a Options,
     lines: Vec<Line>,
     here: Option<Point>,
-    /// The last feed that was said; firmwares remember it.
+    /// The last feed that was written: it is modal.
     feed: f64,
 }
 
 impl Program<'_> {
     fn push(&mut self, text: String, duration_s: f64) {
         let row = self.lines.len() as u64 + 1;
-        self.lines.push(Line { text, row, duration_us: (duration_s * 1e6).round() as u64, position: None });
+        self.lines.push(Line {
+            text,
+            row,
+            duration_us: (duration_s * 1e6).round() as u64,
+            ..Line::default()
+        });
     }
 
     fn start(&mut self) {
@@ -107,7 +112,7 @@ impl Program<'_> {
                 match flavour {
                     Flavour::Grbl | Flavour::FluidNc => self.push(format!("M3 S{angle}"), 0.0),
                     Flavour::Marlin => {
-                        // A servo does not wait for the motion before it.
+                        // `M280` does not wait for queued motion.
                         self.push("M400".to_owned(), 0.0);
                         self.push(format!("M280 P0 S{angle}"), 0.0);
                     }
@@ -125,7 +130,11 @@ impl Program<'_> {
         }
     }
 
-    fn change_pen(&mut self, pen: u16) {
+    /// Pauses for a pen, at the park position once there is ink on the paper.
+    fn change_pen(&mut self, pen: u16, park: Option<Point>) {
+        if let Some(park) = park {
+            self.travel(park);
+        }
         let text = if self.options.flavour == Flavour::Klipper { "PAUSE" } else { "M0" };
         self.push(format!("{text} ; put in pen {pen}"), 0.0);
     }
@@ -154,7 +163,7 @@ impl Program<'_> {
         self.here = Some(to);
     }
 
-    /// The feed in mm a minute where it is not the one said before.
+    /// The feed in mm/min where it differs from the last one written.
     fn feed(&mut self, mm_s: f64) -> String {
         let feed = (mm_s * 60.0 * 10.0).round() / 10.0;
         if feed == self.feed {
@@ -199,23 +208,26 @@ fn xy(p: Point) -> String {
     format!("X{} Y{}", decimal(p.x, 3), decimal(p.y, 3))
 }
 
-/// With so many decimals at the most, no zeros at the end, and no negative 0.
+/// With at most `decimals` decimals, without trailing zeros or a negative 0.
 fn decimal(number: f64, decimals: usize) -> String {
     let text = format!("{number:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// The commands that draw `drawing` (machine mm, in its order), then travel to `park`. `speeds_mm_s` has the speed of each
+/// The lines that draw `drawing` (machine mm, in its order), then travel to `park`. `speeds_mm_s` has the speed of each
 /// stroke.
 pub(super) fn paths(drawing: &Drawing, speeds_mm_s: &[f64], park: Point, options: &Options) -> Vec<Line> {
     let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
     program.start();
     let mut pen = drawing.strokes.first().map(|stroke| stroke.pen);
+    if let Some(first) = pen.filter(|first| drawing.strokes.iter().any(|stroke| stroke.pen != *first)) {
+        program.change_pen(first.0, None);
+    }
     for (stroke, speed) in drawing.strokes.iter().zip(speeds_mm_s) {
         if pen != Some(stroke.pen) {
             pen = Some(stroke.pen);
-            program.change_pen(stroke.pen.0);
+            program.change_pen(stroke.pen.0, Some(park));
         }
         program.travel(stroke.start());
         program.pen(true);
@@ -228,7 +240,7 @@ pub(super) fn paths(drawing: &Drawing, speeds_mm_s: &[f64], park: Point, options
     program.lines
 }
 
-/// The commands that say each row of a plan, in the time it has: with `G93`, or with a feed for each row.
+/// The lines for each row of a plan in its time: with `G93`, or with a feed for each row.
 pub(super) fn timed(
     setpoints: impl IntoIterator<Item = Setpoint>,
     options: &Options,
@@ -236,19 +248,27 @@ pub(super) fn timed(
 ) -> Vec<Line> {
     let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
     program.start();
+    let setpoints: Vec<Setpoint> = setpoints.into_iter().collect();
+    // Plans start at the park position.
+    let park = setpoints.first().map_or(Point::ZERO, |first| first.at);
+    let pens = || setpoints.iter().map(|setpoint| setpoint.row.pen).filter(|pen| *pen != 0);
+    if let Some(first) = pens().next().filter(|first| pens().any(|pen| pen != *first)) {
+        program.change_pen(first, None);
+    }
     let mut before: Option<Setpoint> = None;
     let mut down = false;
     let mut selected = 0;
     let mut sent_us = 0;
     let mut last = 0;
-    for (index, setpoint) in (0_u64..).zip(setpoints) {
+    for (index, setpoint) in (0_u64..).zip(setpoints.iter().copied()) {
         last = index;
         let first = program.lines.len();
         if let Some(previous) = before {
             let pen = previous.row.pen;
             if (pen != 0) != down {
                 if pen != 0 && selected != 0 && pen != selected {
-                    program.change_pen(pen);
+                    program.change_pen(pen, Some(park));
+                    program.travel(previous.at);
                 }
                 selected = if pen == 0 { selected } else { pen };
                 down = pen != 0;
@@ -292,17 +312,17 @@ pub(super) fn timed(
     if inverse {
         program.push("G94".to_owned(), 0.0);
     }
-    // What follows the last row leads to no other.
+    // Lines after the last row belong to it.
     for line in &mut program.lines[done..] {
         line.row = last;
     }
     program.lines
 }
 
-/// Writes commands, with `; s N` before every travel.
+/// Writes lines, with `; s N` before every travel.
 ///
 /// # Errors
-/// Whatever the writer says.
+/// An error of the writer.
 pub(super) fn write<W: Write + ?Sized>(lines: &[Line], out: &mut W) -> Result<(), WriteError> {
     let mut text = Text::new(out);
     for (index, line) in lines.iter().enumerate() {

@@ -11,17 +11,22 @@ struct Gcode {
     lift: Vec<String>,
 }
 
+/// The line at which the machine waits for the operator.
+pub(super) const PAUSE: &str = "M0";
+
 /// A program of lines as [`super::encode`] makes them.
 pub(super) fn program(lines: impl IntoIterator<Item = Line>) -> Program {
     let mut state = ModalState::default();
     let mut lift: Vec<String> = Vec::new();
     let mut program: Vec<Line> = Vec::new();
     for mut line in lines {
-        let code = line.text.split(';').next().unwrap_or_default().trim_end().len();
-        line.text.truncate(code);
+        if let Some((code, comment)) = line.text.split_once(';') {
+            line.comment = comment.trim().to_owned();
+            line.text = code.trim_end().to_owned();
+        }
         let moved = state.accept(&line.text);
         // A program begins by lifting the pen: the lines before its first travel, mode words apart.
-        let mode = ["G2", "G9", "G1"].iter().any(|word| line.text.starts_with(word));
+        let mode = ["G2", "G9", "G1", PAUSE].iter().any(|word| line.text.starts_with(word));
         if program.iter().all(|line| line.position.is_none()) && !moved && !mode {
             lift.push(line.text.clone());
         }
@@ -32,13 +37,13 @@ pub(super) fn program(lines: impl IntoIterator<Item = Line>) -> Program {
 
 /// A program read from a file; comments and empty lines are left out. A line's row is its number in what is left.
 pub(super) fn parse(text: &str) -> Program {
-    let lines = text.lines().map(|line| line.split(';').next().unwrap_or_default().trim());
+    let is_code = |line: &&str| !line.split(';').next().unwrap_or_default().trim().is_empty();
     let mut state = ModalState::default();
-    program((1..).zip(lines.filter(|line| !line.is_empty())).map(|(row, text)| Line {
-        duration_us: state.duration_us(text),
+    program((1..).zip(text.lines().map(str::trim).filter(is_code)).map(|(row, text)| Line {
+        duration_us: state.duration_us(text.split(';').next().unwrap_or_default()),
         text: text.to_owned(),
         row,
-        position: None,
+        ..Line::default()
     }))
 }
 

@@ -80,7 +80,7 @@ impl StatusProtocol for GrblStatus {
     }
 
     fn is_pause(&self, text: &str) -> bool {
-        text.starts_with("M0")
+        text.starts_with(super::program::PAUSE)
     }
 
     fn cycle_start(&self) -> &'static str {

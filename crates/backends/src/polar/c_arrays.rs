@@ -1,4 +1,4 @@
-//! Seed 4's points as they stand in its program: `float radii[] = {...};` and `float angles[] = {...};`, two decimals.
+//! The polar robot's points as in its program: `float radii[] = {...};` and `float angles[] = {...};`, two decimals.
 //!
 //! The program never goes to the last point, so that stands twice. It has no pen: there is one stroke, and time cannot be
 //! said.
@@ -16,8 +16,8 @@ pub(super) const NAME: &str = "c-arrays";
 /// Writes the only stroke of a plan.
 ///
 /// # Errors
-/// When there are several strokes or a point is out of the robot's range, before anything is written; whatever the
-/// writer says.
+/// When there are several strokes or a point is out of the robot's range, before anything is written; an error of the
+/// writer.
 pub(super) fn write<W: Write + ?Sized>(
     setpoints: impl IntoIterator<Item = Setpoint>,
     out: &mut W,

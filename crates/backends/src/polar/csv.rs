@@ -1,4 +1,4 @@
-//! Seed 4's table of polar coordinates: `r,theta,dist`, one point a line.
+//! The polar robot's table of coordinates (report 4 in docs/references.md): `r,theta,dist`, one point a line.
 //!
 //! r in mm from the pivot, theta in degrees clockwise from the left, dist in mm from the point before (nothing for the
 //! first). The robot's pen cannot be lifted, so there is one stroke; time cannot be said.
@@ -16,8 +16,8 @@ pub(super) const NAME: &str = "polar-csv";
 /// Writes the only stroke of a plan.
 ///
 /// # Errors
-/// When there are several strokes or a point is out of the robot's range, before anything is written; whatever the
-/// writer says.
+/// When there are several strokes or a point is out of the robot's range, before anything is written; an error of the
+/// writer.
 pub(super) fn write<W: Write + ?Sized>(
     setpoints: impl IntoIterator<Item = Setpoint>,
     out: &mut W,

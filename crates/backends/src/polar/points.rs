@@ -1,4 +1,4 @@
-//! Points of seed 4's polar robot: what its CSV and its C arrays have in common.
+//! Points of the polar robot: what its table and its C arrays have in common.
 
 use drawing::Point;
 

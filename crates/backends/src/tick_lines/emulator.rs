@@ -1,14 +1,15 @@
-//! A reader of tick lines, after the reference reader in docs/tick-lines.md, with a queue of moves and, for lines that come
-//! with numbers, the answers of [`crate::numbered`]. Lines without a number get `ok`, or `error` and why.
+//! An emulated reader of tick lines, after the reference reader in docs/tick-lines.md, with a queue of moves. Numbered
+//! lines get the answers of [`super::framing`]; lines without a number get `ok`, or `error` and the reason.
 
 use std::collections::VecDeque;
 
 use super::framing::{framed, unframed};
+use crate::backend::EmulatorOptions;
 use crate::device::{Device, Port};
 
-/// Its receive buffer, bytes.
+/// Its receive buffer unless another size is asked for, bytes.
 const BUFFER: usize = 512;
-/// So many lines may wait to be followed.
+/// Capacity of the queue, lines.
 const QUEUE: usize = 16;
 
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +23,8 @@ enum Order {
 #[derive(Debug)]
 pub(super) struct TickLineReader {
     port: Port,
+    /// Room announced in the answer to line 0, bytes.
+    announced: Option<usize>,
     queue: VecDeque<Order>,
     /// When the first of the queue is done, once it has begun.
     until_us: Option<u64>,
@@ -37,10 +40,14 @@ pub(super) struct TickLineReader {
 }
 
 impl TickLineReader {
-    /// Homed at `position` where that is known.
-    pub(super) fn new(position: Option<[i64; 2]>) -> Self {
+    /// Homed at the start position, if there is one.
+    pub(super) fn new(options: &EmulatorOptions) -> Self {
+        let position = options.start;
+        let buffer = options.buffer.unwrap_or(BUFFER);
         Self {
-            port: Port::new(BUFFER),
+            port: Port::new(buffer),
+            // One byte is kept free, as in a ring.
+            announced: options.announces_room.then_some(buffer.saturating_sub(1)),
             queue: VecDeque::new(),
             until_us: None,
             next: 0,
@@ -63,7 +70,7 @@ impl TickLineReader {
         self.port.ink.pen(pen, at);
     }
 
-    /// Each thing at its time, up to `now_us`.
+    /// Executes everything due up to `now_us`, in order.
     fn work(&mut self, now_us: u64) {
         loop {
             while self.take() || self.begin() {}
@@ -99,7 +106,7 @@ impl TickLineReader {
         true
     }
 
-    /// Takes a line out of the buffer if there is room to queue what it says; whether it did.
+    /// Takes a line out of the buffer if the queue has room; whether it did.
     fn take(&mut self) -> bool {
         if self.queue.len() >= QUEUE || self.now_us < self.port.stalled_us {
             return false;
@@ -109,7 +116,7 @@ impl TickLineReader {
         let line = String::from_utf8_lossy(&line).trim().to_owned();
         match unframed(&line) {
             Some(text) => self.numbered(text),
-            // A sum can only be wrong in a line that has one.
+            // Only a line with a checksum can have a wrong one.
             None if line.contains('*') => self.answer(&framed(&format!("ok {}", self.next))),
             None => self.plain(&line),
         }
@@ -139,7 +146,13 @@ impl TickLineReader {
         // 0 begins a session; the same twice does no harm, as nothing else has been taken.
         if number == 0 || number == self.next {
             match self.follow(line) {
-                Ok(()) => self.next = number.saturating_add(1),
+                Ok(()) => {
+                    self.next = number.saturating_add(1);
+                    if let Some(room) = self.announced.filter(|_| number == 0) {
+                        self.answer(&framed(&format!("ok 1 room {room}")));
+                        return;
+                    }
+                }
                 Err(why) => {
                     self.answer(&framed(&format!("error {number} {why}")));
                     return;

@@ -8,6 +8,7 @@
 //! | from the machine | |
 //! |---|---|
 //! | `ok NUMBER*SUM` | every line before that number was accepted; this is the next one expected |
+//! | `ok NUMBER room BYTES*SUM` | the same as the answer to line 0; BYTES may be in transit without an answer |
 //! | `error NUMBER WHY*SUM` | this line cannot be executed |
 //! | `at T1 T2 MOVING*SUM` | motor positions, and whether motion is queued (1) or not (0) |
 //! | `at unknown*SUM` | the machine was homed and has received nothing since |
@@ -46,7 +47,10 @@ impl Framing for TickLineFraming {
         let mut words = unframed(line)?.splitn(3, ' ');
         let (verb, number) = (words.next()?, words.next()?.parse().ok()?);
         match verb {
-            "ok" => Some(Reply::Next(number)),
+            "ok" => {
+                let room = words.next().and_then(|rest| rest.strip_prefix("room ")?.parse().ok());
+                Some(Reply::Next { number, room })
+            }
             "error" => {
                 let why = words.next().unwrap_or("no reason given").to_owned();
                 Some(Reply::Error { number, why })

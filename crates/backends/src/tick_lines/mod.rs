@@ -18,8 +18,6 @@ use crate::transmission::open_loop::OpenLoop;
 use crate::transmission::sliding_window::SlidingWindow;
 use crate::{Line, Unrepresentable, WriteError};
 
-/// Lines in transit at once.
-const WINDOW_LINES: usize = 8;
 /// How long the pen has to lift when a session fails, microseconds.
 const LIFT_US: u64 = 300_000;
 
@@ -81,8 +79,8 @@ impl Backend for Answered {
     }
 
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
-        let window = options.window.unwrap_or(WINDOW_LINES);
-        Some(Box::new(SlidingWindow::new(program, Box::new(framing::TickLineFraming), window)))
+        let framing = Box::new(framing::TickLineFraming);
+        Some(Box::new(SlidingWindow::new(program, framing, options.window)))
     }
 
     fn status(&self) -> Option<Box<dyn StatusProtocol>> {
@@ -90,7 +88,7 @@ impl Backend for Answered {
     }
 
     fn emulator(&self, options: &EmulatorOptions) -> Option<Box<dyn Device>> {
-        Some(Box::new(emulator::TickLineReader::new(options.start)))
+        Some(Box::new(emulator::TickLineReader::new(options)))
     }
 }
 

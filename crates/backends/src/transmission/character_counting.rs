@@ -9,7 +9,7 @@
 //! the session ends the position is queried once more.
 
 use crate::program::Program;
-use crate::session::{LineReader, Outcome, Progress, Session};
+use crate::session::{LineReader, Outcome, Progress, Session, Waiting};
 use crate::status::{Answer, StatusProtocol};
 
 /// A line that is not acknowledged within this and the time that it may wait for room leads to a query, microseconds.
@@ -56,6 +56,8 @@ pub struct CharacterCounting {
     /// Whether the machine reported that it holds for the operator, and whether the operator has confirmed.
     holding: bool,
     confirmed: bool,
+    /// Lines are only sent up to this number until the operator resumes.
+    pause_at: Option<usize>,
     stopping: Option<u64>,
     failing: Option<Outcome>,
     outcome: Option<Outcome>,
@@ -79,6 +81,7 @@ impl CharacterCounting {
             reader: LineReader::default(),
             holding: false,
             confirmed: false,
+            pause_at: None,
             stopping: None,
             failing: None,
             outcome: None,
@@ -174,6 +177,11 @@ impl CharacterCounting {
         self.state = State::Querying { tries: 0, next_us: now_us, at_rest: None };
     }
 
+    /// Whether the machine reported that it holds at a pause of the program.
+    fn machine_waits(&self) -> bool {
+        self.holding && self.pausing()
+    }
+
     fn is_pause(&self, line: usize) -> bool {
         self.status.is_pause(&self.program.lines[line].text)
     }
@@ -194,6 +202,9 @@ impl CharacterCounting {
     /// Whether the next line may be sent now.
     fn may_send(&self) -> bool {
         let Some(next) = self.program.lines.get(self.sent) else { return false };
+        if self.pause_at.is_some_and(|lines| self.sent >= lines) {
+            return false;
+        }
         if self.sent == self.acked {
             return true;
         }
@@ -314,17 +325,32 @@ impl Session for CharacterCounting {
             self.outcome = Some(Outcome::Stopped { row: self.program.row(0) });
             return;
         }
-        self.confirmed |= self.awaiting_operator();
+        self.pause_at = None;
+        self.confirmed |= self.machine_waits();
         // Lines sent and found not to be executed are sent again: they are part of what was begun.
         self.stopping = Some(self.program.stop_after(self.high_water_mark));
     }
 
-    fn awaiting_operator(&self) -> bool {
-        self.holding && self.pausing()
+    fn pause(&mut self) {
+        if self.stopping.is_none() {
+            self.pause_at = self.program.next_pen_up(self.high_water_mark);
+        }
     }
 
-    fn resume(&mut self) {
-        self.confirmed |= self.awaiting_operator();
+    fn waiting_for(&self) -> Option<Waiting> {
+        if self.machine_waits() {
+            let comment = self.program.lines[self.sent - 1].comment.clone();
+            return Some(Waiting::Machine(comment));
+        }
+        (self.pause_at == Some(self.acked)).then_some(Waiting::Operator)
+    }
+
+    fn resume(&mut self, _now_us: u64) {
+        if self.machine_waits() {
+            self.confirmed = true;
+        } else {
+            self.pause_at = None;
+        }
     }
 
     fn reconnected(&mut self, now_us: u64) {

@@ -5,7 +5,7 @@
 //! the plan less a lead that the machine's buffer must hold; that needs no flow control.
 
 use crate::program::Program;
-use crate::session::{Outcome, Progress, Session};
+use crate::session::{Outcome, Progress, Session, Waiting};
 
 /// The session.
 #[derive(Debug)]
@@ -18,6 +18,8 @@ pub struct OpenLoop {
     started_us: Option<u64>,
     /// Plan time before the next line.
     clock_us: u64,
+    /// Lines are only sent up to this number until the operator resumes.
+    pause_at: Option<usize>,
     stopping: Option<u64>,
     outcome: Option<Outcome>,
 }
@@ -32,6 +34,7 @@ impl OpenLoop {
             lead_us,
             started_us: None,
             clock_us: 0,
+            pause_at: None,
             stopping: None,
             outcome: None,
         }
@@ -51,7 +54,7 @@ impl Session for OpenLoop {
     fn transmit(&mut self, now_us: u64) -> Vec<u8> {
         self.started_us.get_or_insert(now_us);
         let mut out = Vec::new();
-        while self.outcome.is_none() && now_us >= self.due_us() {
+        while self.outcome.is_none() && self.waiting_for().is_none() && now_us >= self.due_us() {
             let Some(line) = self.program.lines.get(self.sent) else {
                 self.outcome = Some(match self.stopping {
                     Some(row) => Outcome::Stopped { row },
@@ -72,14 +75,33 @@ impl Session for OpenLoop {
     }
 
     fn wake_us(&self) -> Option<u64> {
-        self.outcome.is_none().then(|| self.due_us())
+        (self.outcome.is_none() && self.waiting_for().is_none()).then(|| self.due_us())
     }
 
     fn stop(&mut self, _now_us: u64) {
         if self.stopping.is_some() || self.outcome.is_some() {
             return;
         }
+        self.pause_at = None;
         self.stopping = Some(self.program.stop_after(self.sent));
+    }
+
+    fn pause(&mut self) {
+        if self.stopping.is_none() {
+            self.pause_at = self.program.next_pen_up(self.sent);
+        }
+    }
+
+    fn waiting_for(&self) -> Option<Waiting> {
+        (self.pause_at == Some(self.sent)).then_some(Waiting::Operator)
+    }
+
+    fn resume(&mut self, now_us: u64) {
+        if self.waiting_for().is_some() {
+            // The plan's clock stood still meanwhile: the next line is due now.
+            self.started_us = Some(now_us.saturating_sub(self.clock_us));
+        }
+        self.pause_at = None;
     }
 
     fn reconnected(&mut self, _now_us: u64) {
@@ -95,7 +117,7 @@ impl Session for OpenLoop {
         let last_sent_row = self.program.row(self.sent);
         let row = self.program.row(0);
         let known = Progress::of(&self.program.lines, self.sent, row, last_sent_row);
-        Progress { done_us: self.clock_us, ..known }
+        Progress { done_us: self.clock_us, acknowledged: false, ..known }
     }
 
     fn outcome(&self) -> Option<&Outcome> {

@@ -7,7 +7,7 @@
 use std::fmt;
 
 use crate::program::Program;
-use crate::session::{LineReader, Outcome, Progress, Session};
+use crate::session::{LineReader, Outcome, Progress, Session, Waiting};
 
 /// A line is retransmitted after this and the time that it may wait for room, microseconds.
 const ACK_TIMEOUT_US: u64 = 1_000_000;
@@ -19,8 +19,13 @@ const QUEUE: usize = 48;
 /// What a line from the machine says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
-    /// Every line before this number was accepted.
-    Next(usize),
+    /// Every line before `number` was accepted.
+    Next {
+        /// The number of the line expected next.
+        number: usize,
+        /// Free bytes of the receive buffer, where the machine announces them.
+        room: Option<usize>,
+    },
     /// This line cannot be executed.
     Error {
         /// The line's number.
@@ -38,6 +43,57 @@ pub trait Framing: fmt::Debug + Send {
     fn parse(&self, line: &str) -> Option<Reply>;
 }
 
+/// Bytes in transit before the machine has acknowledged more.
+const FIRST_WINDOW: usize = 48;
+/// Bytes in transit at most: with a round trip of 16 ms they feed 435 lines/s, more than a wire of 115200 baud carries.
+const LARGEST_WINDOW: usize = 255;
+/// Growth per acknowledged line, bytes.
+const GROWTH: usize = 8;
+/// Above the size at which a line was lost the window grows by one byte in this many acknowledged lines.
+const PROBE_LINES: usize = 64;
+
+/// The bytes that may be in transit. A machine that announces the room in its receive buffer sets them. Otherwise they grow
+/// with each acknowledged line and are halved on a loss, and then grow only to three quarters of the size at which the
+/// line was lost: an Uno with a buffer of 64 bytes loses one line, not one after the other.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    announced: Option<usize>,
+    bytes: usize,
+    ceiling: usize,
+    acked_at_ceiling: usize,
+    max_lines: Option<usize>,
+}
+
+impl Window {
+    fn new(max_lines: Option<usize>) -> Self {
+        let (bytes, ceiling) = (FIRST_WINDOW, LARGEST_WINDOW);
+        Self { announced: None, bytes, ceiling, acked_at_ceiling: 0, max_lines }
+    }
+
+    fn allows(&self, lines: usize, bytes: usize) -> bool {
+        bytes <= self.announced.unwrap_or(self.bytes) && self.max_lines.is_none_or(|most| lines <= most)
+    }
+
+    fn on_ack(&mut self, lines: usize) {
+        if self.bytes + GROWTH * lines <= self.ceiling {
+            self.bytes += GROWTH * lines;
+            return;
+        }
+        self.bytes = self.bytes.max(self.ceiling);
+        self.acked_at_ceiling += lines;
+        if self.acked_at_ceiling >= PROBE_LINES && self.ceiling < LARGEST_WINDOW {
+            self.acked_at_ceiling = 0;
+            self.ceiling += 1;
+        }
+    }
+
+    fn on_loss(&mut self) {
+        self.ceiling = (self.bytes * 3 / 4).max(FIRST_WINDOW / 2);
+        self.bytes = (self.bytes / 2).max(FIRST_WINDOW / 2);
+        self.acked_at_ceiling = 0;
+    }
+}
+
 /// The session.
 #[derive(Debug)]
 pub struct SlidingWindow {
@@ -49,11 +105,13 @@ pub struct SlidingWindow {
     sent: usize,
     /// Lines sent at least once.
     high_water_mark: usize,
-    window: usize,
+    window: Window,
     reader: LineReader,
     /// When the line after `acked` is retransmitted.
     again_us: u64,
     tries: u32,
+    /// Lines are only sent up to this number until the operator resumes.
+    pause_at: Option<usize>,
     stopping: Option<u64>,
     failing: Option<Outcome>,
     outcome: Option<Outcome>,
@@ -61,15 +119,16 @@ pub struct SlidingWindow {
 }
 
 impl SlidingWindow {
-    /// With `window` lines in transit at once.
-    pub fn new(program: Program, framing: Box<dyn Framing>, window: usize) -> Self {
+    /// With at most `max_lines` lines in transit; otherwise the bytes in transit are the only limit.
+    pub fn new(program: Program, framing: Box<dyn Framing>, max_lines: Option<usize>) -> Self {
         Self {
             program,
             framing,
             acked: 0,
             sent: 0,
             high_water_mark: 0,
-            window: window.max(1),
+            window: Window::new(max_lines),
+            pause_at: None,
             reader: LineReader::default(),
             again_us: 0,
             tries: 0,
@@ -106,6 +165,44 @@ impl SlidingWindow {
         (self.sent, self.high_water_mark) = (self.acked, self.acked);
     }
 
+    /// The machine expects line `next`.
+    fn on_next(&mut self, next: usize, room: Option<usize>, now_us: u64) {
+        if next > self.acked {
+            if self.acked == 0 {
+                self.window.announced = room;
+            }
+            self.window.on_ack(next - self.acked);
+            self.acked = next;
+            self.tries = 0;
+            self.again_us = now_us + self.timeout_us();
+            self.sent = self.sent.max(next);
+        } else if next == self.acked && self.sent > next {
+            // It expects this line and has dropped those after it. They are answered too, so the retransmission happens
+            // only once, and soon.
+            self.again_us = self.again_us.min(now_us + ACK_TIMEOUT_US / 4);
+        } else if next == 0 && self.acked > 0 {
+            // Answers come in order: only a machine that was reset expects line 0 again.
+            self.fail("the machine was reset: it expects line 0 again, and its position is lost".to_owned());
+        }
+    }
+
+    /// Whether the next line fits into the window; one line in transit always does.
+    fn may_send(&self) -> bool {
+        if self.sent == self.program.lines.len() || self.pause_at.is_some_and(|lines| self.sent >= lines) {
+            return false;
+        }
+        if self.sent == self.acked {
+            return true;
+        }
+        // Line 0 restarts the numbering: it must have been accepted before another follows.
+        if self.acked == 0 {
+            return false;
+        }
+        let framed = |number: usize| self.framing.frame(number, &self.program.lines[number].text).len();
+        let bytes: usize = (self.acked..=self.sent).map(framed).sum();
+        self.window.allows(self.sent + 1 - self.acked, bytes)
+    }
+
     fn finish_if_done(&mut self) {
         if self.acked == self.program.lines.len() && self.outcome.is_none() {
             self.outcome = Some(match (self.failing.take(), self.stopping) {
@@ -121,17 +218,8 @@ impl Session for SlidingWindow {
     fn receive(&mut self, bytes: &[u8], now_us: u64) {
         for line in self.reader.add(bytes) {
             match self.framing.parse(&line) {
-                Some(Reply::Next(next)) if next <= self.high_water_mark => {
-                    if next > self.acked {
-                        self.acked = next;
-                        self.tries = 0;
-                        self.again_us = now_us + self.timeout_us();
-                        self.sent = self.sent.max(next);
-                    } else if next == self.acked && self.sent > next {
-                        // It expects this line and has dropped those after it. They are answered too, so the
-                        // retransmission happens only once, and soon.
-                        self.again_us = self.again_us.min(now_us + ACK_TIMEOUT_US / 4);
-                    }
+                Some(Reply::Next { number, room }) if number <= self.high_water_mark => {
+                    self.on_next(number, room, now_us);
                 }
                 Some(Reply::Error { number, why }) => {
                     self.fail(format!("the machine cannot execute line {number}: {why}"));
@@ -151,15 +239,17 @@ impl Session for SlidingWindow {
             self.tries += 1;
             if self.tries > TRIES {
                 let received = self.reader.last_received();
-                self.give_up(format!("no answer to line {} after {TRIES} tries; {received}", self.acked));
+                let line = self.acked;
+                self.give_up(format!("line {line} was not acknowledged in {TRIES} tries; {received}"));
                 return Vec::new();
+            }
+            if self.sent > self.acked + 1 {
+                self.window.on_loss();
             }
             self.sent = self.acked;
         }
-        // Line 0 restarts the numbering: it must have been accepted before another follows.
-        let window = if self.acked == 0 { 1 } else { self.window };
         let mut out = Vec::new();
-        while self.sent < self.program.lines.len() && self.sent < self.acked + window {
+        while self.may_send() {
             if self.sent == self.acked {
                 self.again_us = now_us;
             }
@@ -184,8 +274,23 @@ impl Session for SlidingWindow {
             self.outcome = Some(Outcome::Stopped { row: self.program.row(0) });
             return;
         }
+        self.pause_at = None;
         self.stopping = Some(self.program.stop_after(self.high_water_mark));
         self.again_us = self.again_us.max(now_us);
+    }
+
+    fn pause(&mut self) {
+        if self.stopping.is_none() && self.failing.is_none() {
+            self.pause_at = self.program.next_pen_up(self.high_water_mark);
+        }
+    }
+
+    fn waiting_for(&self) -> Option<Waiting> {
+        (self.pause_at == Some(self.acked)).then_some(Waiting::Operator)
+    }
+
+    fn resume(&mut self, _now_us: u64) {
+        self.pause_at = None;
     }
 
     fn reconnected(&mut self, now_us: u64) {

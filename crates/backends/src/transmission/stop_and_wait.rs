@@ -6,7 +6,7 @@
 //! the next line's.
 
 use crate::program::{Line, Program};
-use crate::session::{LineReader, Outcome, Progress, Session};
+use crate::session::{LineReader, Outcome, Progress, Session, Waiting};
 
 /// A line is retransmitted after this and the time that it should take, microseconds.
 const ACK_TIMEOUT_US: u64 = 1_000_000;
@@ -49,6 +49,8 @@ pub struct StopAndWait {
     acked: usize,
     state: State,
     reader: LineReader,
+    /// Lines are only sent up to this number until the operator resumes.
+    pause_at: Option<usize>,
     stopping: Option<u64>,
     outcome: Option<Outcome>,
     retransmitted: u64,
@@ -63,6 +65,7 @@ impl StopAndWait {
             acked: 0,
             state: State::Ready(0),
             reader: LineReader::default(),
+            pause_at: None,
             stopping: None,
             outcome: None,
             retransmitted: 0,
@@ -139,7 +142,7 @@ impl Session for StopAndWait {
         {
             self.advance(now_us);
         }
-        if self.outcome.is_some() {
+        if self.outcome.is_some() || self.waiting_for().is_some() {
             return Vec::new();
         }
         let line = &self.program.lines[self.acked];
@@ -171,7 +174,7 @@ impl Session for StopAndWait {
     }
 
     fn wake_us(&self) -> Option<u64> {
-        if self.outcome.is_some() {
+        if self.outcome.is_some() || self.waiting_for().is_some() {
             return None;
         }
         Some(match self.state {
@@ -189,8 +192,25 @@ impl Session for StopAndWait {
             self.outcome = Some(Outcome::Stopped { row: self.program.row(0) });
             return;
         }
+        self.pause_at = None;
         // The line in transit is waited for: it cannot be recalled.
         self.stopping = Some(self.program.stop_after(self.sent()));
+    }
+
+    fn pause(&mut self) {
+        if self.stopping.is_none() {
+            self.pause_at = self.program.next_pen_up(self.sent());
+        }
+    }
+
+    fn waiting_for(&self) -> Option<Waiting> {
+        (self.pause_at == Some(self.sent()))
+            .then_some(Waiting::Operator)
+            .filter(|_| self.sent() == self.acked)
+    }
+
+    fn resume(&mut self, _now_us: u64) {
+        self.pause_at = None;
     }
 
     fn reconnected(&mut self, now_us: u64) {

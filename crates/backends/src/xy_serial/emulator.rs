@@ -1,18 +1,18 @@
-//! Seed 2's single-belt plotter on its wire: homing and `0`, one line of 20 characters at a time, `1` for a place or a pen
-//! state, no answer to what is out of range.
+//! The emulated single-belt plotter: homing and `0`, one line of 20 characters at a time, `1` on arrival or for a pen
+//! state, no answer to anything out of range.
 //!
 //! Its parser reads from the end of the line and takes the last digit for tenths; bytes that come while it homes are lost,
-//! and so is what does not fit into its 20 characters. After homing it goes to 125, 125 by itself and says `1`.
+//! and so is what does not fit into its 20 characters. After homing it moves to 125, 125 by itself and answers `1`.
 
 use crate::device::{Device, Port};
 
 /// Characters of a line, its end included.
 const BUFFER: usize = 20;
-/// Its main loop looks at what came in so often, microseconds.
+/// Period of its main loop, which polls the receive buffer, microseconds.
 const LOOP_US: u64 = 1000;
 /// Homing takes this long, microseconds.
 const HOMING_US: u64 = 3_000_000;
-/// It goes this fast, mm/s.
+/// Its speed, mm/s.
 const SPEED: f64 = 100.0;
 /// Both coordinates are below this, mm.
 const RANGE: f64 = 250.0;
@@ -25,7 +25,7 @@ pub(super) struct XyPlotter {
     flag_us: Option<u64>,
     from: [f64; 2],
     to: [f64; 2],
-    /// When it set out for `to`.
+    /// When it started towards `to`.
     since_us: u64,
     locked: bool,
     homed_us: u64,
@@ -36,8 +36,8 @@ pub(super) struct XyPlotter {
 }
 
 impl XyPlotter {
-    /// Switched on now (or homed already), answering a place from within so many mm: 0 for a plotter that is exactly there, 1
-    /// for the program as it stands.
+    /// Switched on now (or homed already), answering from within `within_mm` of a point: 0 for an exact plotter, 1 for its
+    /// actual program.
     pub(super) fn new(homed: bool, within_mm: f64) -> Self {
         let middle = [125.0, 125.0];
         Self {
@@ -63,7 +63,7 @@ impl XyPlotter {
         self.since_us + (self.way() / SPEED * 1e6).ceil() as u64
     }
 
-    /// When it says `1`: both coordinates are near enough.
+    /// When it answers `1`: both coordinates are near enough.
     fn answers_us(&self) -> u64 {
         let farthest = (self.to[0] - self.from[0]).abs().max((self.to[1] - self.from[1]).abs());
         if farthest <= self.within_mm || farthest == 0.0 {
@@ -114,7 +114,7 @@ impl XyPlotter {
                 self.port.answers.push(b"1\n".to_vec());
             }
             _ => {
-                // From the end: the last digit is tenths, points are passed over, there are no signs.
+                // From the end: the last digit is tenths, points are skipped, there are no signs.
                 let Some(comma) = line[..=last].iter().rposition(|byte| *byte == b',') else { return };
                 let number = |digits: &[u8]| {
                     let mut place = 0.1;
@@ -124,7 +124,7 @@ impl XyPlotter {
                         next
                     })
                 };
-                // Noise may make it less than 0, where the frame is in the way.
+                // Noise may make it negative, which the frame prevents.
                 let tenth = |mm: f64| (mm * 10.0).round().max(0.0) / 10.0;
                 let (y, x) = (tenth(number(&line[..comma])), tenth(number(&line[comma + 1..=last])));
                 if x < RANGE && y < RANGE {
@@ -153,7 +153,7 @@ impl Device for XyPlotter {
     }
 
     fn advance(&mut self, now_us: u64) {
-        // Each thing at its time: an answer falls due before the line that follows it.
+        // In order: an answer is due before the line that follows it.
         while let Some(next_us) = self.wake_us().filter(|next_us| *next_us <= now_us) {
             let next_us = next_us.max(self.now_us);
             let before = (self.flag_us, self.locked, self.homed, self.now_us);
@@ -182,7 +182,7 @@ impl Device for XyPlotter {
     }
 
     fn room(&self) -> usize {
-        // It has no flow control: everything is let through.
+        // No flow control.
         usize::MAX
     }
 

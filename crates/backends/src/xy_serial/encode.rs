@@ -1,9 +1,10 @@
-//! The serial lines of seed 2's single-belt plotter: `YYY.Y,XXX.X` goes to a point in mm, `P` lowers the pen, `p` lifts it.
+//! The serial lines of the single-belt plotter (report 2 in docs/references.md): `YYY.Y,XXX.X` moves to a point in mm, `P`
+//! lowers the pen, `p` lifts it.
 //!
-//! y comes first, with exactly one decimal and no sign, both below 250.0: what is out of range the firmware drops
-//! without an answer. It answers `1` once it is there. Between points both motors run for themselves, so while the pen
-//! is down every row of the plan is a point, as far as it differs from the one before; with the pen up only the end of a
-//! travel is one. Neither time nor the number of the pen can be said.
+//! y comes first, with exactly one decimal and no sign, both below 250.0: the firmware drops anything out of range without
+//! an answer. It answers `1` on arrival. Between points the motors move independently, so while the pen is down every row
+//! of the plan that differs from the one before is a point; with the pen up only the end of a travel is one. The lines
+//! contain neither time nor pen numbers.
 
 use std::io::Write;
 
@@ -21,7 +22,7 @@ const RANGE: i64 = 2500;
 /// # Errors
 /// With the first row whose pen position, rounded to a tenth of a mm, is not in range.
 pub(super) fn lines(setpoints: impl IntoIterator<Item = Setpoint>) -> Result<Vec<Line>, Unrepresentable> {
-    let mut lines = vec![Line { text: "p".to_owned(), row: 0, duration_us: 0, position: None }];
+    let mut lines = vec![Line { text: "p".to_owned(), row: 0, duration_us: 0, ..Line::default() }];
     let mut here: Option<[i64; 2]> = None;
     let mut sent_us = 0;
     let mut before: Option<(u64, Setpoint)> = None;
@@ -31,10 +32,10 @@ pub(super) fn lines(setpoints: impl IntoIterator<Item = Setpoint>) -> Result<Vec
             let to = tenths(index, setpoint)?;
             let duration_us = setpoint.row.t_us - *sent_us;
             if here != Some(to) {
-                lines.push(Line { text: point(to), row: index, duration_us, position: None });
+                lines.push(Line { text: point(to), row: index, duration_us, ..Line::default() });
                 (here, *sent_us) = (Some(to), setpoint.row.t_us);
             } else if let Some(last) = lines.last_mut() {
-                // It is there already: only time has gone by.
+                // It is there already: only time has passed.
                 last.row = index;
             }
             Ok(())
@@ -44,10 +45,10 @@ pub(super) fn lines(setpoints: impl IntoIterator<Item = Setpoint>) -> Result<Vec
         }
         if setpoint.row.pen != pen_before {
             go(index, &setpoint, &mut sent_us)?;
-            // From one pen to another it goes up first.
+            // Between two pens it is lifted.
             for (text, when) in [("p", pen_before != 0), ("P", setpoint.row.pen != 0)] {
                 if when {
-                    lines.push(Line { text: text.to_owned(), row: index, duration_us: 0, position: None });
+                    lines.push(Line { text: text.to_owned(), row: index, duration_us: 0, ..Line::default() });
                     sent_us = setpoint.row.t_us;
                 }
             }
@@ -58,7 +59,7 @@ pub(super) fn lines(setpoints: impl IntoIterator<Item = Setpoint>) -> Result<Vec
         let to = tenths(index, &setpoint)?;
         if here != Some(to) {
             let duration_us = setpoint.row.t_us - sent_us;
-            lines.push(Line { text: point(to), row: index, duration_us, position: None });
+            lines.push(Line { text: point(to), row: index, duration_us, ..Line::default() });
         }
     }
     Ok(lines)
@@ -67,7 +68,7 @@ pub(super) fn lines(setpoints: impl IntoIterator<Item = Setpoint>) -> Result<Vec
 /// Writes a plan.
 ///
 /// # Errors
-/// As [`lines`], before anything is written; whatever the writer says.
+/// As [`lines`], before anything is written; an error of the writer.
 pub(super) fn write<W: Write + ?Sized>(
     setpoints: impl IntoIterator<Item = Setpoint>,
     out: &mut W,

@@ -98,8 +98,8 @@ impl Backend for XySerial {
     /// if its own arrival came a moment earlier, the second answer follows at once and is waited for.
     fn session(&self, mut program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {
         if let Some(first) = program.lines.first() {
-            let middle =
-                Line { text: MIDDLE.to_owned(), row: first.row, duration_us: TO_MIDDLE_US, position: None };
+            let (text, row) = (MIDDLE.to_owned(), first.row);
+            let middle = Line { text, row, duration_us: TO_MIDDLE_US, ..Line::default() };
             program.lines.insert(MIDDLE_LINE, middle);
         }
         Some(Box::new(StopAndWait::new(program, ACKNOWLEDGEMENT)))

@@ -169,7 +169,7 @@ impl Setup {
     }
 
     pub fn device(self) -> Box<dyn Device> {
-        let options = EmulatorOptions { start: Some(HOME), homed: false, answers_within_mm: 0.0 };
+        let options = EmulatorOptions { start: Some(HOME), ..EmulatorOptions::default() };
         self.backend.emulator(&options).unwrap()
     }
 

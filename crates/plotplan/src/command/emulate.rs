@@ -47,8 +47,13 @@ pub(crate) fn run(arguments: &Emulate) -> Result<(), Failure> {
 }
 
 fn device(arguments: &Emulate, machine: Option<&LoadedMachine>) -> Result<Box<dyn Device>, Failure> {
-    let options =
-        EmulatorOptions { start: machine.map(start_ticks), homed: arguments.homed, answers_within_mm: 0.0 };
+    let options = EmulatorOptions {
+        start: machine.map(start_ticks),
+        homed: arguments.homed,
+        answers_within_mm: 0.0,
+        buffer: arguments.buffer,
+        announces_room: arguments.announce_room,
+    };
     let device = arguments.protocol.0.emulator(&options);
     device.ok_or_else(|| Failure::Usage(anyhow::anyhow!("there is no emulator for this protocol")))
 }

@@ -50,8 +50,9 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let Some(mut session) = backend.session(program, &options) else {
         return Err(Failure::Usage(anyhow::anyhow!("{} cannot be sent", backend.name())));
     };
-    let outcome = wire.run(&mut *session, arguments.reconnect);
-    report(&outcome, &*session)
+    // Standard input has the plan, or the operator's keys.
+    let outcome = wire.run(&mut *session, arguments.reconnect, arguments.plan != "-");
+    report(&outcome, &*session, wire.is_interrupted())
 }
 
 /// The program from the row where it is to begin.
@@ -114,16 +115,30 @@ fn dry_run(arguments: &Send, program: &Program) -> Result<(), Failure> {
 }
 
 /// Reports how it ended, and how to resume.
-fn report(outcome: &Outcome, session: &dyn Session) -> Result<(), Failure> {
+fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool) -> Result<(), Failure> {
     let progress = session.progress();
     let mut extra = String::new();
     if progress.retransmitted > 0 {
         let _ = write!(extra, ", {} retransmitted", progress.retransmitted);
     }
+    let failed = |text: String| {
+        if interrupted {
+            terminal::error(&text);
+            return Err(Failure::Interrupted);
+        }
+        Err(Failure::Io(anyhow::anyhow!(text)))
+    };
     match outcome {
         Outcome::Done => {
             terminal::say(&format!("sent {} lines{extra}\n", progress.lines));
             Ok(())
+        }
+        Outcome::Stopped { row } if !progress.acknowledged => {
+            terminal::say(&format!(
+                "stopped after sending everything up to row {row}; the machine acknowledged nothing. Check that the pen is up, then resume with\n  {}\n",
+                resume_command(*row)
+            ));
+            Err(Failure::Interrupted)
         }
         Outcome::Stopped { row } => {
             terminal::say(&format!(
@@ -131,6 +146,13 @@ fn report(outcome: &Outcome, session: &dyn Session) -> Result<(), Failure> {
                 resume_command(*row)
             ));
             Err(Failure::Interrupted)
+        }
+        Outcome::Failed { row, why, .. } if !progress.acknowledged => {
+            let text = format!(
+                "{why}; the machine acknowledged nothing. Check that the pen is up, then start again with\n  {}",
+                resume_command(*row)
+            );
+            failed(text)
         }
         Outcome::Failed { row, last_sent_row, why } => {
             let unsure = if last_sent_row > row {
@@ -142,7 +164,7 @@ fn report(outcome: &Outcome, session: &dyn Session) -> Result<(), Failure> {
                 "{why}; the machine has acknowledged everything up to row {row}{unsure}. Check that the pen is up, then resume with\n  {}",
                 resume_command(*row)
             );
-            Err(Failure::Io(anyhow::anyhow!(text)))
+            failed(text)
         }
     }
 }
