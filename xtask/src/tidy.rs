@@ -18,7 +18,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("verify", &["drawing", "kinematics", "plan"]),
     ("picture", &["drawing", "plan"]),
     ("backends", &["drawing", "kinematics", "plan"]),
-    ("compiler", &["drawing", "hpgl", "kinematics", "ordering", "picture", "plan", "planner", "svg", "verify"]),
+    (
+        "compiler",
+        &["drawing", "hpgl", "kinematics", "ordering", "picture", "plan", "planner", "svg", "verify"],
+    ),
     (
         "plotplan",
         &[

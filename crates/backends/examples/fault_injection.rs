@@ -29,7 +29,7 @@ const KINDS: [Kind; 6] = [
     ("unplugged, up to 30 s", |random, _, duration_us| {
         vec![Fault::Unplugged(random.below(duration_us), random.below(30_000_000))]
     }),
-    ("six of these at once", |random, answers, duration_us| {
+    ("six of these combined", |random, answers, duration_us| {
         (0..6)
             .map(|_| match random.below(5) {
                 0 => Fault::LostAnswer(random.below(answers)),
@@ -89,7 +89,7 @@ fn main() {
             holds(setup, &table, kind(random, answers, duration_us))
         });
     }
-    row("Ctrl-C, resumed", &mut |setup, _, duration_us, random| {
+    row("Ctrl-C, then resumed", &mut |setup, _, duration_us, random| {
         holds_if_stopped(setup, &table, random.below(duration_us), Vec::new())
     });
     row("Ctrl-C and an answer lost", &mut |setup, answers, duration_us, random| {
@@ -105,5 +105,5 @@ fn main() {
             (0..RUNS).filter(|_| !holds(*setup, &table, vec![Fault::GarbledByte(random.below(lines * 25))]));
         format!("{} of {RUNS}", wrong.count())
     });
-    println!("| byte garbled on its way to the machine | {} |", cells.collect::<Vec<_>>().join(" | "));
+    println!("| byte garbled on the way to the controller | {} |", cells.collect::<Vec<_>>().join(" | "));
 }

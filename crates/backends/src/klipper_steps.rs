@@ -57,7 +57,7 @@ struct Stepper {
     /// Clock of its last step.
     clock: u64,
     forward: Option<bool>,
-    /// The intervals that are to be said: how long, how many.
+    /// The run not written yet: interval and count.
     run: Option<(u64, u64)>,
 }
 

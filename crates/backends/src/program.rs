@@ -395,3 +395,71 @@ impl Program {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use plan::{Limits, Motor};
+
+    use super::*;
+
+    /// Takes rows of exactly one period: retimed rows are not representable.
+    #[derive(Debug)]
+    struct OnePeriod;
+
+    impl RowEncoder for OnePeriod {
+        fn lines(
+            &self,
+            table: &TickTable,
+            _start: [i64; 2],
+            _resumed: bool,
+        ) -> Result<Vec<Line>, Unrepresentable> {
+            let line = |row: usize| Line { text: format!("move {row}"), row: row as u64, ..Line::default() };
+            (1..table.rows.len())
+                .map(|row| match table.rows[row].t_us - table.rows[row - 1].t_us {
+                    10_000 => Ok(line(row)),
+                    _ => Err(Unrepresentable::Uneven { row: row as u64, period_us: 10_000 }),
+                })
+                .collect()
+        }
+
+        fn lift(&self, _done: &[Line]) -> Vec<Line> {
+            vec![Line { text: "lift".to_owned(), ..Line::default() }]
+        }
+    }
+
+    fn table(rows: usize) -> TickTable {
+        let limits = Limits { speed: 4000.0, acceleration: 40_000.0, jerk: None };
+        let motor = |name: &str| Motor { name: name.to_owned(), limits };
+        let row = |k: usize| Row { t_us: 10_000 * k as u64, pen: 1, ticks: [40 * k as i64, 0] };
+        TickTable {
+            header: Header {
+                machine: "made up".to_owned(),
+                motors: [motor("a"), motor("b")],
+                placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+                period_us: 10_000,
+                rows: rows as u64,
+                lift_overlap_us: 0,
+                duration_us: 10_000 * (rows as u64 - 1),
+            },
+            rows: (0..rows).map(row).collect(),
+        }
+    }
+
+    #[test]
+    fn stop_lifts_the_pen_although_retimed_rows_are_not_representable() -> Result<(), ProgramError> {
+        let program = Program::of_table(table(50), Arc::new(OnePeriod))?;
+        let (tail, row) = program.stop_sequence(20);
+        assert_eq!((tail.len(), tail[0].text.as_str(), row), (1, "lift", 20));
+        Ok(())
+    }
+
+    #[test]
+    fn unrepresentable_and_empty_plans_are_errors() {
+        let mut uneven = table(5);
+        uneven.rows[3].t_us += 1;
+        let refused = Program::of_table(uneven, Arc::new(OnePeriod));
+        assert!(matches!(refused, Err(ProgramError::Unrepresentable(_))), "{refused:?}");
+        let empty = TickTable { rows: Vec::new(), ..table(5) };
+        assert!(matches!(Program::of_table(empty, Arc::new(OnePeriod)), Err(ProgramError::Empty)));
+    }
+}

@@ -5,10 +5,11 @@
 mod common;
 
 use backends::{
-    EmulatorOptions, EncodeOptions, Fault, FaultInjector, Outcome, PenActuator, PositionQuery, Progress,
-    ReportedPosition, Session, SessionOptions, Waiting, simulate,
+    EmulatorOptions, EncodeOptions, Fault, FaultInjector, Outcome, PenActuator, PlanSource, PositionQuery,
+    Progress, ReportedPosition, RowIter, Session, SessionOptions, Waiting, simulate,
 };
 use common::{HOME, Random, Setup, backends, drawing, limits, measure, setups, small};
+use kinematics::Machine;
 use plan::{Row, TickTable};
 use proptest::prelude::*;
 
@@ -285,6 +286,25 @@ fn pauses_name_the_pen_and_park_the_machine() {
         assert_eq!(lines[pause - 1], "G0 X76 Y60");
         assert!(lines[pause + 1].starts_with("G0 X"), "{}", lines[pause + 1]);
     }
+}
+
+#[test]
+fn gcode_travel_durations_use_the_travel_speed() {
+    let table = drawing();
+    let mut parts = common::machine().parts().clone();
+    parts.pen.max_travel_speed_mm_s = 160.0;
+    let machine = Machine::new(parts).unwrap();
+    let rows =
+        || -> RowIter<'_> { Box::new(table.rows.iter().map(|row| (*row, row.ticks.map(|t| t as f64)))) };
+    let source = PlanSource::new(&table.header, &rows).on_machine(&machine);
+    let gcode = backends::find("gcode-grbl").unwrap();
+    let program = gcode.program(&source, &EncodeOptions::default()).unwrap();
+    let park = program.lines.iter().rposition(|line| line.text == "G0 X76 Y60").unwrap();
+    let before = program.lines[..park].iter().rev().find_map(|line| line.position).unwrap();
+    let way_um = libm::hypot((before[0] - 76_000) as f64, (before[1] - 60_000) as f64);
+    let expected_us = way_um / 1000.0 / 160.0 * 1e6;
+    let duration_us = program.lines[park].duration_us as f64;
+    assert!((duration_us - expected_us).abs() < 10.0, "{duration_us} us instead of {expected_us}");
 }
 
 /// Sends a plan of 40 strokes to a reader of tick lines with this receive buffer: bytes lost, lines retransmitted.

@@ -14,7 +14,9 @@ use serialport::FlowControl;
 /// Prefix of a port that is a TCP connection: `tcp:HOST:PORT`.
 const TCP: &str = "tcp:";
 /// How long a TCP connection may take to open.
-const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// The same when it is opened again: the sender must stay responsive.
+const RECONNECT_TIMEOUT: Duration = Duration::from_millis(250);
 /// Reads and writes return after this, so that a port that was closed is noticed.
 const IO_TIMEOUT: Duration = Duration::from_millis(20);
 
@@ -54,7 +56,7 @@ impl Port {
     /// Opens it.
     pub(crate) fn open(settings: &Settings, number: u32, events: &Sender<Event>) -> anyhow::Result<Self> {
         let (out, input) = match settings.path.strip_prefix(TCP) {
-            Some(address) => connect(address)?,
+            Some(address) => connect(address, if number == 0 { CONNECT_TIMEOUT } else { RECONNECT_TIMEOUT })?,
             None => open_serial(settings)?,
         };
         let (sender, bytes) = channel();
@@ -80,11 +82,11 @@ impl Port {
 
 type Ends = (Box<dyn Write + Send>, Box<dyn Read + Send>);
 
-fn connect(address: &str) -> anyhow::Result<Ends> {
+fn connect(address: &str, timeout: Duration) -> anyhow::Result<Ends> {
     let addresses = address.to_socket_addrs().context("expected tcp:HOST:PORT")?;
     let mut failed = None;
     for address in addresses {
-        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {
+        match TcpStream::connect_timeout(&address, timeout) {
             Ok(stream) => {
                 // Lines are short, and the machine waits for them.
                 stream.set_nodelay(true)?;

@@ -191,7 +191,11 @@ impl Wire {
             }
             let silent = !self.heard || !clear;
             if silent && self.interrupted.is_some_and(|at| now().duration_since(at) >= SILENT_STOP) {
-                let why = if clear { "the machine never answered" } else { "the port takes no more bytes" };
+                let why = match &self.port {
+                    None => "the port was lost",
+                    Some(_) if clear => "the machine never answered",
+                    Some(_) => "the port takes no more bytes",
+                };
                 return failed(session, format!("interrupted; {why}"));
             }
             let within = match session.wake_us() {

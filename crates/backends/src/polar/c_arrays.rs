@@ -1,7 +1,7 @@
 //! The polar robot's points as in its program: `float radii[] = {...};` and `float angles[] = {...};`, two decimals.
 //!
-//! The program never goes to the last point, so that stands twice. It has no pen: there is one stroke, and time cannot be
-//! said.
+//! The program never moves to the last point, so that point is written twice. It has no pen: there is one stroke. It
+//! contains no time.
 
 use std::io::Write;
 

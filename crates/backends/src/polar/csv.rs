@@ -1,7 +1,7 @@
 //! The polar robot's table of coordinates (report 4 in docs/references.md): `r,theta,dist`, one point a line.
 //!
 //! r in mm from the pivot, theta in degrees clockwise from the left, dist in mm from the point before (nothing for the
-//! first). The robot's pen cannot be lifted, so there is one stroke; time cannot be said.
+//! first). The robot's pen cannot be lifted, so there is one stroke. It contains no time.
 
 use std::io::Write;
 

@@ -98,7 +98,17 @@ mod tests {
     #[test]
     fn framed_line_matches_documentation() {
         let documentation = include_str!("../../../../docs/sending.md");
-        assert!(documentation.contains(&format!("`{}`", framed("12:m 1 10000 804 -4"))));
+        for text in ["12:m 1 10000 804 -4", "ok 1 room 127"] {
+            assert!(documentation.contains(&format!("`{}`", framed(text))), "{}", framed(text));
+        }
+    }
+
+    #[test]
+    fn announced_room_is_parsed() {
+        let parsed = |text: &str| TickLineFraming.parse(&framed(text));
+        assert_eq!(parsed("ok 1 room 127"), Some(Reply::Next { number: 1, room: Some(127) }));
+        assert_eq!(parsed("ok 1 room"), Some(Reply::Next { number: 1, room: None }));
+        assert_eq!(parsed("ok 1"), Some(Reply::Next { number: 1, room: None }));
     }
 
     #[test]

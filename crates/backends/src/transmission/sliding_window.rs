@@ -309,3 +309,32 @@ impl Session for SlidingWindow {
         self.outcome.as_ref()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn window_begins_small_grows_and_halves_on_loss() {
+        let mut window = Window::new(None);
+        assert!(window.allows(2, FIRST_WINDOW) && !window.allows(2, FIRST_WINDOW + 1));
+        for _ in 0..100 {
+            window.on_ack(1);
+        }
+        assert!(window.allows(9, LARGEST_WINDOW - GROWTH) && !window.allows(9, LARGEST_WINDOW + 1));
+        let before = window.bytes;
+        window.on_loss();
+        assert_eq!(window.bytes, before / 2);
+        for _ in 0..PROBE_LINES / 2 {
+            window.on_ack(1);
+        }
+        assert_eq!(window.bytes, before * 3 / 4);
+    }
+
+    #[test]
+    fn announced_room_and_line_limit_bound_the_window() {
+        let mut window = Window::new(Some(2));
+        window.announced = Some(500);
+        assert!(window.allows(2, 500) && !window.allows(2, 501) && !window.allows(3, 100));
+    }
+}
