@@ -269,7 +269,7 @@ fn lifted(machine: &Machine, stroke: &Stroke) -> Vec<JointPath> {
 }
 
 /// Duration of the planner's profiles over all sections, s.
-fn ours(machine: &Machine, paths: &[JointPath], pen: f64, period: f64) -> f64 {
+fn planner_duration(machine: &Machine, paths: &[JointPath], pen: f64, period: f64) -> f64 {
     let cap = SpeedCap { pen_mm_s: pen, row_deviation_mm: f64::INFINITY, period_s: period };
     paths.iter().map(|path| profile(machine, path, &cap).duration_s).sum()
 }
@@ -338,8 +338,10 @@ fn profile_durations_near_optimum() {
                 }
                 let best = fine - (coarse - fine);
                 let below = below(machine, &paths, pen, 64);
-                let (coarse_rows, ours) =
-                    (ours(machine, &paths, pen, 1e-2), ours(machine, &paths, pen, 1e-3));
+                let (coarse_rows, ours) = (
+                    planner_duration(machine, &paths, pen, 1e-2),
+                    planner_duration(machine, &paths, pen, 1e-3),
+                );
                 let (excess, coarse_excess) = (ours / best, coarse_rows / best);
                 println!(
                     "{name:<8} {shape:<16} {pen:>6} {below:>9.5} {best:>9.5} {ours:>9.5}  {excess:.5} {coarse_excess:.5}"
@@ -360,6 +362,27 @@ fn profile_durations_near_optimum() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// A straight interval that starts slower than its cap and ends at it was driven as one even ramp
+/// instead of a ramp and constant speed. Slow zones divide lines in this way.
+#[test]
+fn straight_interval_that_ends_at_its_cap_is_ramp_and_constant_speed() {
+    let machine = machines::corexy();
+    let stroke = polyline(&[(40.0, 80.0), (140.0, 80.0)]);
+    let section = &sections(&stroke, &BUDGET)[0];
+    let piece = section[0];
+    let half = |t0: f64, t1: f64| Piece { curve: piece.curve.part(t0, t1), rate: 2.0 * piece.rate, ..piece };
+    let duration = |section: Vec<Piece>| {
+        let pose = machine.pose_near(section[0].curve.start(), &machine.start()).expect("within reach");
+        let path = JointPath::from_section(&machine, section, pose, 0.1).expect("within reach");
+        planner_duration(&machine, &[path], 30.0, 1e-3)
+    };
+    let (whole, halves) = (duration(vec![piece]), duration(vec![half(0.0, 0.5), half(0.5, 1.0)]));
+    // Rest to rest at v = 30 mm/s with a = 30000/92 mm/s²: d/v + v/a.
+    let exact = 100.0 / 30.0 + 30.0 / (30000.0 / 92.0);
+    assert!((whole - exact).abs() < 1e-9, "{whole} s instead of {exact} s");
+    assert!((halves - exact).abs() < 1e-9, "{halves} s instead of {exact} s");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
@@ -378,7 +401,7 @@ proptest! {
             points.push((at.x, at.y));
         }
         let paths = lifted(&machine, &polyline(&points));
-        let (ours, below) = (ours(&machine, &paths, 1000.0, 1e-2), below(&machine, &paths, 1000.0, 64));
+        let (ours, below) = (planner_duration(&machine, &paths, 1000.0, 1e-2), below(&machine, &paths, 1000.0, 64));
         prop_assert!(below <= ours * (1.0 + 1e-8), "{} s is less than {} s, which is impossible", ours, below);
         prop_assert!(ours <= 1.05 * below, "{} s could perhaps be {} s", ours, below);
     }

@@ -200,8 +200,8 @@ impl IntervalConstraints {
         if !self.is_straight() && b0 + b1 > 0.0 {
             return SpeedShape::Ramp;
         }
-        // To `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f two_h |r|: u = (1
-        // - |r| b) / (p + two_h |r|), and (2 b - b0 - b1) / 2 = u length.
+        // To `b` and down again with |m'| |u| + |m''| b <= a, where |m'| <= p + f two_h |r|:
+        // u = (1 - |r| b) / (p + two_h |r|), and (2 b - b0 - b1) / 2 = u length.
         let mut b = self.cap;
         for Strip { p, r } in self.strips {
             let (m1, m2) = (p + self.two_h * r.abs(), r.abs());
@@ -212,8 +212,10 @@ impl IntervalConstraints {
         let u = strongest.fold(f64::INFINITY, f64::min);
         let length = 0.5 * self.two_h;
         let (up, down) = ((b - b0) / (2.0 * u), (b - b1) / (2.0 * u));
-        if b > b0.max(b1) && u > 0.0 && up + down <= length * (1.0 + 1e-9) {
-            let up = up.min(length);
+        // The peak may be the speed at an end, for example where the interval ends at its cap: then
+        // it is reached before the end and kept. Up to rounding, since `b` is recomputed here.
+        if b >= b0.max(b1) * (1.0 - 1e-12) && u > 0.0 && up + down <= length * (1.0 + 1e-9) {
+            let (up, down) = (up.clamp(0.0, length), down.max(0.0));
             SpeedShape::Peak { b, up, down: down.min(length - up) }
         } else {
             SpeedShape::Ramp
