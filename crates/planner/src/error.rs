@@ -34,4 +34,12 @@ pub enum PlanError {
         /// The reason.
         why: &'static str,
     },
+    /// The plan would be too long.
+    #[error("the plan would have {rows} rows, more than {max}: choose a longer period or higher limits")]
+    TooManyRows {
+        /// The number of rows.
+        rows: u64,
+        /// The largest number.
+        max: u64,
+    },
 }

@@ -28,6 +28,9 @@ const BATCH: usize = 4096;
 /// without planning again.
 const CACHED_PHASES: usize = 1 << 19;
 
+/// The largest number of rows of a plan: 11 days at a period of 1 ms.
+const MAX_ROWS: u64 = 1_000_000_000;
+
 /// One step of a plan.
 #[derive(Clone, Debug)]
 enum Motion {
@@ -129,8 +132,11 @@ pub fn plan<'a>(
                 phases += profile.phases.len();
             }
         }
-        periods += motion.periods();
-        rows += motion.rows();
+        periods = u64::saturating_add(periods, motion.periods());
+        rows = u64::saturating_add(rows, motion.rows());
+        if rows > MAX_ROWS {
+            return Err(PlanError::TooManyRows { rows, max: MAX_ROWS });
+        }
         if phases > CACHED_PHASES {
             cached = None;
         }

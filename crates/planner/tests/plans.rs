@@ -242,6 +242,50 @@ fn jerk_limits_hold_in_third_differences_of_rows() {
     }
 }
 
+/// A polar machine whose motors take 0.26 s to reach their largest acceleration.
+fn slow_jerk(jerk: bool) -> Machine {
+    let mut parts = machines::polar().parts().clone();
+    for (motor, [speed, acceleration, largest_jerk]) in
+        parts.motors.iter_mut().zip([[133.7, 1459.1, 5650.3], [1625.7, 17745.8, 68718.3]])
+    {
+        motor.max_speed_ticks_s = speed;
+        motor.max_acceleration_ticks_s2 = acceleration;
+        motor.max_jerk_ticks_s3 = jerk.then_some(largest_jerk);
+    }
+    parts.motors[1].ticks_per_unit = 57.11;
+    parts.motors[1].offset_ticks = -138.0 * 57.11;
+    parts.pen.max_speed_mm_s = 5.688;
+    Machine::new(parts).expect("valid limits")
+}
+
+/// A spiral of short chords with noise, as digitized.
+fn noisy_spiral() -> Drawing {
+    let mut state = 7_u64;
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let point = |k: u32| {
+        let angle = 0.09 * f64::from(k);
+        let r = 4.0 + 0.02 * f64::from(k);
+        let (sin, cos) = libm::sincos(angle);
+        Point::new(r * cos + 0.4 * noise(), 90.0 + r * sin + 0.4 * noise())
+    };
+    Drawing { strokes: vec![polyline((0..400).map(point).collect())] }
+}
+
+/// Polygons as controllable sets once accepted a profile of 6e6 s here, whose last phase started at
+/// nearly 0, or found none and slowed the whole stroke down 32 times.
+#[test]
+fn noisy_stroke_under_jerk_is_at_most_1_25_times_as_long() {
+    let settings = Settings::new(0.48182, 500);
+    let (with, without) = (slow_jerk(true), slow_jerk(false));
+    let [with, without] =
+        [&with, &without].map(|machine| plan(machine, noisy_spiral(), &settings).expect("within reach"));
+    let (with, without) = (with.times().drawing_s, without.times().drawing_s);
+    assert!(with <= 1.25 * without, "{with} s with jerk limits, {without} s without");
+}
+
 fn settings() -> Settings {
     Settings::new(0.1, 10_000)
 }

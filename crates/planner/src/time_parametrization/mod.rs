@@ -2,10 +2,10 @@
 //! the speed, acceleration and jerk limits of every motor.
 
 mod acceleration;
+mod barrier;
 mod constraints;
 mod fixed_duration;
 mod jerk;
-mod polygon;
 mod profile;
 mod straight;
 
