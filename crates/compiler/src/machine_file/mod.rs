@@ -3,16 +3,17 @@
 //! The form is documented in docs/machine-files.md. Values carry their units as text and keep it, so that a file that was
 //! read can be written into a plan document and read back without a digit's change.
 
+mod error;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use drawing::Rect;
 use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
-use kinematics::{
-    JointKind, JointPos, JointRange, Machine, MachineError, MachineParts, Mechanism, Motor, PenLimits,
-};
+use kinematics::{JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits};
 use serde::{Deserialize, Serialize};
 
+pub use self::error::{MachineFileError, SyntaxError};
 use crate::quantity::{self, Dimension, QuantityError};
 
 /// A preset: its name, a line about it, and its file.
@@ -31,27 +32,27 @@ pub const PRESETS: [Preset; 5] = [
     Preset {
         name: "coaxial",
         about: "two-link arm, both motors at the base, elbow driven through a belt; letter sheet",
-        toml: include_str!("../machines/coaxial.toml"),
+        toml: include_str!("../../machines/coaxial.toml"),
     },
     Preset {
         name: "corexy",
         about: "CoreXY table, 200 x 200 mm",
-        toml: include_str!("../machines/corexy.toml"),
+        toml: include_str!("../../machines/corexy.toml"),
     },
     Preset {
         name: "hbot",
         about: "single-belt (H-bot) table, 250 x 250 mm",
-        toml: include_str!("../machines/hbot.toml"),
+        toml: include_str!("../../machines/hbot.toml"),
     },
     Preset {
         name: "polar",
         about: "turning rail with a sliding rack, half ring from r = 48 to 138 mm",
-        toml: include_str!("../machines/polar.toml"),
+        toml: include_str!("../../machines/polar.toml"),
     },
     Preset {
         name: "cartesian",
         about: "plain x-y table, 300 x 300 mm, 80 steps/mm",
-        toml: include_str!("../machines/cartesian.toml"),
+        toml: include_str!("../../machines/cartesian.toml"),
     },
 ];
 
@@ -179,46 +180,13 @@ impl Default for PlanTable {
     }
 }
 
-/// Why a machine file makes no machine.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MachineFileError {
-    /// It is not a machine file: not TOML, a key that is missing or not known, a value of the wrong type.
-    #[error("{message}{}", suggestion.as_ref().map_or(String::new(), |s| format!("\nhelp: did you mean `{s}`?")))]
-    Syntax {
-        /// What is wrong and where, several lines.
-        message: String,
-        /// A known key that is near to one that is not.
-        suggestion: Option<String>,
-    },
-    /// A quantity is not what its key wants.
-    #[error("{key}: {source}")]
-    Quantity {
-        /// Which key.
-        key: String,
-        /// What is wrong with it.
-        source: QuantityError,
-    },
-    /// A parameter of the geometry cannot be read.
-    #[error("geometry.{0}")]
-    Geometry(ParameterError),
-    /// The parts do not make a machine.
-    #[error(transparent)]
-    Machine(#[from] MachineError),
-    /// The file contradicts itself.
-    #[error("{0}")]
-    Invalid(String),
-}
-
 impl MachineFile {
     /// Reads a machine file.
     ///
     /// # Errors
     /// When it is not TOML of the documented form; the message shows the line, and for an unknown key the nearest known.
     pub fn parse(toml: &str) -> Result<Self, MachineFileError> {
-        toml::from_str(toml).map_err(|error| MachineFileError::Syntax {
-            suggestion: nearest_known(error.message()),
-            message: error.to_string().trim_end().to_owned(),
-        })
+        toml::from_str(toml).map_err(|error| MachineFileError::Syntax(SyntaxError::of(toml, &error)))
     }
 
     /// The machine that the file describes.
@@ -345,7 +313,7 @@ impl TableReader<'_> {
         match self.0.get(key) {
             Some(Parameter::Text(text)) => Ok(text),
             Some(Parameter::Number(number)) => {
-                let reason = format!("{number} must be text in quotes");
+                let reason = format!("{number} has no unit: write it as text, such as \"{number}mm\"");
                 Err(ParameterError::Unreadable { key, reason })
             }
             None => Err(ParameterError::Missing { key }),
@@ -390,15 +358,7 @@ impl MotorTable {
     }
 }
 
-/// Of serde's "unknown field `a`, expected one of `b`, `c`" the expected name nearest to the unknown, if one is near.
-fn nearest_known(message: &str) -> Option<String> {
-    let known = message.strip_prefix("unknown ")?;
-    let mut names = known.split('`').skip(1).step_by(2);
-    let wrong = names.next()?;
-    nearest(wrong, names)
-}
-
-/// Of the names the one nearest to a misspelt one, if any is near enough to be meant.
+/// The name most similar to a misspelt one (Jaro-Winkler above 0.75).
 pub fn nearest<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
     names
         .map(|name| (strsim::jaro_winkler(wrong, name), name))
@@ -435,14 +395,41 @@ mod tests {
         let toml = PRESETS[0].toml;
         assert!(toml.contains(from), "{from}");
         let result = MachineFile::parse(&toml.replacen(from, to, 1)).and_then(|file| file.machine());
-        result.unwrap_err().to_string()
+        chain(&result.unwrap_err())
+    }
+
+    /// The error with its sources, as the program prints them.
+    fn chain(error: &MachineFileError) -> String {
+        let mut text = error.to_string();
+        let mut source = std::error::Error::source(error);
+        while let Some(error) = source {
+            text = format!("{text}: {error}");
+            source = error.source();
+        }
+        text
     }
 
     #[test]
-    fn mistakes_are_explained() {
+    fn errors_state_each_cause_once() {
+        for (from, to) in [
+            ("l1 = \"206mm\"", "l1 = \"206\""),
+            ("theta = \"90deg\"", "theta = \"90\""),
+            ("lift_time = \"150ms\"", "lift_time = \"150\""),
+        ] {
+            let error = error_of(from, to);
+            assert_eq!(error.matches("is not").count(), 1, "{error}");
+        }
+    }
+
+    #[test]
+    fn messages_of_machine_files() {
         let said = [
             error_of("max_speed = \"60deg/s\"", "max_sped = \"60deg/s\""),
             error_of("elbow = \"left\"", "elbow = \"lefft\""),
+            error_of("l2 = \"256mm\"", "lenght = \"256mm\""),
+            error_of("l2 = \"256mm\"", "l2 = 256"),
+            error_of("max_speed = \"60mm/s\"", "max_speed = 60"),
+            error_of("name = \"coaxial\"", ""),
             error_of("[[1, 0], [0, -1]]", "[[1, 1], [1, 1]]"),
             error_of("l1 = \"206mm\"", "l1 = \"206\""),
             error_of("counts = \"3200/rev\"", "counts = \"3200\""),
