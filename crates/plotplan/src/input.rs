@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::Context as _;
-use compiler::import::{self, Document, Page, Severity};
+use compiler::import::{self, Document, ImportError, Page, Severity};
 use compiler::report::text;
 use drawing::Drawing;
 
@@ -79,8 +79,17 @@ impl LoadedDrawing {
 
 /// Reads a drawing and prints its diagnostics. With `--strict` a warning stops here.
 pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedDrawing, Failure> {
+    if plan::file::is_plan(&input.bytes) {
+        let what = format!("{} is a plan, not a drawing", input.name);
+        return Err(Failure::Drawing(anyhow::anyhow!(what)));
+    }
     let options = arguments.options();
-    let document = import::read(&input.bytes, &options).map_err(|error| Failure::Usage(error.into()))?;
+    let document = import::read(&input.bytes, &options).map_err(|error| match error {
+        ImportError::Foreign { .. } => {
+            Failure::Drawing(anyhow::Error::new(error).context(input.name.clone()))
+        }
+        _ => Failure::Usage(error.into()),
+    })?;
     terminal::diagnostics(input, &document.diagnostics, arguments.message_format);
     let pages = document.pages.len();
     if arguments.page == 0 || arguments.page > pages {

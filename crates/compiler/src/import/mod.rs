@@ -5,6 +5,7 @@
 //! in that list.
 
 mod document;
+mod foreign;
 mod hpgl;
 mod points;
 mod svg;
@@ -37,6 +38,14 @@ fn is_default(options: &SvgOptions) -> bool {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
+    /// The file is in a format that holds no drawing, or one that is not read.
+    #[error("this is {what}, not a drawing that plotplan reads; {help}")]
+    Foreign {
+        /// What it is.
+        what: &'static str,
+        /// What makes a readable drawing of it.
+        help: &'static str,
+    },
     /// No plotter has this name.
     #[error("unknown plotter {name}; known: {}", known.join(", "))]
     Plotter {
@@ -82,10 +91,16 @@ pub const IMPORTERS: &[Importer] = &[svg::IMPORTER, points::IMPORTER, hpgl::IMPO
 /// Reads a drawing of any recognized format.
 ///
 /// # Errors
-/// Options that name an unknown plotter or paper, or that mean nothing for the format.
+/// A file of another kind, options that name an unknown plotter or paper, or that have no effect
+/// on the format.
 pub fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     let importer = IMPORTERS.iter().find(|importer| (importer.recognizes)(bytes));
     let importer = importer.unwrap_or(&hpgl::IMPORTER);
+    if importer.name == hpgl::IMPORTER.name
+        && let Some(foreign::Foreign { what, help }) = foreign::recognize(bytes)
+    {
+        return Err(ImportError::Foreign { what, help });
+    }
     if importer.name != svg::IMPORTER.name && !is_default(&options.svg) {
         let options = "--pens, --hatch, --outline-fills and --dpi are";
         return Err(ImportError::NoEffect { options, format: importer.name });

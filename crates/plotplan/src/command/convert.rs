@@ -29,10 +29,6 @@ pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Fa
         }
     };
     let input = input::read(&arguments.file)?;
-    if plan::file::is_plan(&input.bytes) {
-        let what = format!("{} is a plan already; convert takes a drawing", input.name);
-        return Err(Failure::Drawing(anyhow::anyhow!(what)));
-    }
     let drawn = input::drawing(&input, &arguments.reading)?;
     if drawn.document.pages.len() > 1 {
         let (page, pages) = (arguments.reading.page, drawn.document.pages.len());
