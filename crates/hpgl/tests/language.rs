@@ -38,3 +38,14 @@ fn white_pens_are_reported() {
     check(b"PC1,255,255,255;IN;SP1;PD400,0;", &["1: 0,0 400,0"], &[]);
     check(b"IN;PC1,255,255,255;SP1;PU400,0;", &[], &[]);
 }
+
+#[test]
+fn scale_before_input_points() {
+    check(b"IN;SP1;SC0,1000,0,1000;IP0,0,4000,4000;PU0,0;PD1000,1000;PU;SP0;", &["1: 0,0 4000,4000"], &[]);
+    // Nothing is drawn, or not in user units.
+    check(b"IN;SP1;SC0,1,0,1;PU1,1;SC;PU0,0;PD400,0;", &["1: 0,0 400,0"], &[]);
+    // Drawn before the IP: P1 and P2 are assumed.
+    let assumed = document(b"IN;SP1;SC0,1,0,1;PU0,0;PD1,1;IP0,0,4000,4000;");
+    assert_eq!(codes(&assumed), ["H0226"]);
+    assert_eq!(assumed.diagnostics[0].span.start, 7);
+}

@@ -92,6 +92,8 @@ pub(crate) struct Interpreter {
     label_end: Option<Point>,
     /// What `BL` kept, and where it stands in the file.
     label_buffer: (Vec<u8>, usize),
+    /// The last `SC` while nothing was drawn with it: its bytes, number and pen position.
+    unsettled_scale: Option<(Span, usize, Point)>,
     /// The symbol to draw at every point.
     symbol: Option<Glyph>,
     /// How many hatch lines may still be drawn.
@@ -131,6 +133,7 @@ impl Interpreter {
             margin: Point::ZERO,
             label_end: None,
             label_buffer: (Vec::new(), 0),
+            unsettled_scale: None,
             symbol: None,
             pieces_left: pieces,
             pages: Vec::new(),
@@ -321,6 +324,7 @@ impl Interpreter {
                 self.report(codes::PEN_PUT_AWAY, || "the pen is put away (SP0): nothing is drawn".into());
             }
         }
+        self.report_assumed_points();
         self.note_pen();
     }
 

@@ -9,6 +9,7 @@ use super::line_type::LineType;
 use super::ticks::Ticks;
 use super::{Interpreter, PenSelection};
 use crate::codes;
+use crate::mnemonic::Mnemonic;
 use crate::profile::paper_of_code;
 
 /// `PS` with one number up to this is the code of a paper format (7475A, 7550A); more is a length
@@ -33,6 +34,7 @@ impl Interpreter {
         self.characters = Characters::default();
         self.symbol = None;
         self.reset_palette();
+        self.unsettled_scale = None;
         self.tracer.set_dashes(None);
         self.frame.initialise();
         self.tracer.set_clip(self.frame.clip());
@@ -49,6 +51,7 @@ impl Interpreter {
         self.ticks = Ticks::default();
         self.characters = Characters::default();
         self.symbol = None;
+        self.unsettled_scale = None;
         self.tracer.set_dashes(None);
         self.frame.set_defaults();
         self.tracer.set_clip(self.frame.clip());
@@ -128,14 +131,25 @@ impl Interpreter {
             self.report(codes::BAD_SCALE, || "`SC` names a range without extent; it has no effect".into());
             return;
         }
-        if scale.is_some() && self.frame.points_are_assumed() {
-            let (p1, p2) = self.frame.points();
-            self.report(codes::ASSUMED_PLOTTER, || {
-                format!("no IP sets P1 and P2: ({}, {}) and ({}, {}) are taken", p1.x, p1.y, p2.x, p2.y)
-            });
-        }
+        // P1 and P2 count when something is drawn: an IP may follow.
+        self.unsettled_scale = scale.map(|_| (self.span, self.number, self.position_mm));
+        self.pens.touch();
         self.frame.set_scale(scale);
         self.frame_changed();
+    }
+
+    /// Reports that ink is scaled by assumed P1 and P2, at the `SC` that did so.
+    pub(super) fn report_assumed_points(&mut self) {
+        let Some((span, number, position_mm)) = self.unsettled_scale.take() else { return };
+        if !self.frame.points_are_assumed() {
+            return;
+        }
+        let (p1, p2) = self.frame.points();
+        self.findings.report(codes::ASSUMED_PLOTTER, Mnemonic(*b"SC"), span, number, position_mm, || {
+            let message =
+                format!("no IP sets P1 and P2: ({}, {}) and ({}, {}) are taken", p1.x, p1.y, p2.x, p2.y);
+            (message, None)
+        });
     }
 
     /// `RO`: turns the frame by quarters. The pen stays where it is on the paper.
