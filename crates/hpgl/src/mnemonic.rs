@@ -13,7 +13,9 @@ impl Mnemonic {
     /// A printer reset (`ESC E`) or the end of a job (`ESC %-12345X`): what was drawn so far is a
     /// page of its own.
     pub const RESET: Self = Self([0, 1]);
-    /// A PCL picture frame (`ESC *c #x#Y`); parameters: width and height in plotter units.
+    /// A PCL picture frame (`ESC *c #x#Y`) or plot size (`ESC *c #k#L`). Four parameters: width and
+    /// height of the frame, then of the plot that is scaled to it, plotter units; NaN where one is not
+    /// given.
     pub const PICTURE_FRAME: Self = Self([0, 2]);
     /// Entry into HP-GL/2 from PCL or RTL (`ESC %#B`); parameter: the number.
     pub const ENTER: Self = Self([0, 3]);

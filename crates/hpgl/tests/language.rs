@@ -49,3 +49,22 @@ fn scale_before_input_points() {
     assert_eq!(codes(&assumed), ["H0226"]);
     assert_eq!(assumed.diagnostics[0].span.start, 7);
 }
+
+#[test]
+fn pcl_plot_size_scales_to_frame() {
+    let square = "IN;SP1;PU0,0;PD2000,0,2000,2000;PU;\x1b%0A\x1bE";
+    let file = |sizes: &str| format!("\x1bE{sizes}\x1b%0B{square}").into_bytes();
+    // A frame of 4 inches for a plot of 8.
+    check(&file("\x1b*c2880x2880Y\x1b*c8K\x1b*c8L"), &["1: 0,0 1000,0 1000,1000"], &[]);
+    check(&file("\x1b*c8k8l2880x2880Y"), &["1: 0,0 1000,0 1000,1000"], &[]);
+    // In width only; 0 and a reset make it the size of the frame again.
+    check(&file("\x1b*c2880x2880Y\x1b*c16K"), &["1: 0,0 500,0 500,2000"], &[]);
+    check(&file("\x1b*c2880x2880Y\x1b*c8k8L\x1b*c0k0L"), &["1: 0,0 2000,0 2000,2000"], &[]);
+    check(&file("\x1b*c2880x2880Y\x1b*c8k8L\x1bE"), &["1: 0,0 2000,0 2000,2000"], &[]);
+    // P1 and P2 are the corners of the frame.
+    check(
+        b"\x1bE\x1b*c2880x2880Y\x1b*c8k8L\x1b%0BIN;SP1;SC0,1,0,1;PU0,0;PD1,1;\x1b%0A",
+        &["1: 0,0 4064,4064"],
+        &[],
+    );
+}

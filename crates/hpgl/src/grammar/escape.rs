@@ -88,6 +88,8 @@ pub(crate) struct Pcl {
     pub(crate) binary: bool,
     /// Picture frame width and height, decipoints.
     pub(crate) frame: (Option<f64>, Option<f64>),
+    /// Size of the plot that is scaled to the picture frame, inches.
+    pub(crate) plot_size: (Option<f64>, Option<f64>),
 }
 
 /// `pcl = family [ group ] { field }`, up to a field that ends in a capital letter, then its binary
@@ -109,6 +111,8 @@ fn pcl(input: Input<'_>) -> Parsed<'_, Pcl> {
         match (names, letter.to_ascii_uppercase()) {
             (('*', Some('c')), b'X') => found.frame.0 = Some(size),
             (('*', Some('c')), b'Y') => found.frame.1 = Some(size),
+            (('*', Some('c')), b'K') => found.plot_size.0 = Some(size),
+            (('*', Some('c')), b'L') => found.plot_size.1 = Some(size),
             _ => {}
         }
         rest = &after[data_bytes.min(after.len())..];

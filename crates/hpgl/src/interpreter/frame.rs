@@ -81,6 +81,12 @@ pub(crate) struct Frame {
     /// Unless the file set a page, its edges do not clip; a page of one length is open towards y.
     page_clip: Option<Rect>,
     page_set: bool,
+    /// Width and height of the picture frame of PCL, and of the plot that is scaled to it; plotter
+    /// units.
+    picture_frame: Option<Vec2>,
+    plot_size: (Option<f64>, Option<f64>),
+    /// What the plot is scaled by in width and height.
+    plot_scale: Vec2,
     /// Why the plotter is the one it is.
     reason: ProfileReason,
     /// P1 and P2 are those of the plotter, by nobody's word.
@@ -107,6 +113,9 @@ impl Frame {
             hard_clip: options.hard_clip,
             page_clip: None,
             page_set: false,
+            picture_frame: None,
+            plot_size: (None, None),
+            plot_scale: Vec2::new(1.0, 1.0),
             reason: if options.automatic { ProfileReason::Assumed } else { ProfileReason::Options },
             points_assumed: true,
             p1: options.scaling_points.0,
@@ -144,6 +153,9 @@ impl Frame {
         self.hard_clip = self.default_hard_clip;
         self.page_clip = None;
         self.page_set = false;
+        self.picture_frame = None;
+        self.plot_size = (None, None);
+        self.plot_scale = Vec2::new(1.0, 1.0);
         self.reason = if self.automatic { ProfileReason::Assumed } else { ProfileReason::Options };
         self.initialise();
     }
@@ -157,7 +169,8 @@ impl Frame {
             Rotation::R180 => Affine::new([-1.0, 0.0, 0.0, -1.0, x0 + x1, y0 + y1]),
             Rotation::R270 => Affine::new([0.0, -1.0, 1.0, 0.0, 0.0, y0 + y1]),
         };
-        self.plu_to_mm = Affine::scale(self.unit_mm) * self.turn;
+        let Vec2 { x, y } = self.unit_mm * self.plot_scale;
+        self.plu_to_mm = Affine::scale_non_uniform(x, y) * self.turn;
         let AxisMap { factor, shift } = self.user_to_plu;
         self.user_to_mm = self.plu_to_mm * Affine::new([factor.x, 0.0, 0.0, factor.y, shift.x, shift.y]);
         if self.scale.is_some()
@@ -379,8 +392,26 @@ impl Frame {
         self.window.is_some()
     }
 
-    /// Makes an area of that size the page without clipping to it.
+    /// Makes the picture frame of PCL the page without clipping to it.
     pub(crate) fn set_picture_frame(&mut self, width: f64, height: f64) {
+        self.picture_frame = Some(Vec2::new(width, height));
+        self.scale_to_frame();
+    }
+
+    /// Sets the size of the plot that is scaled to the picture frame, plotter units: 0 makes it that of
+    /// the frame again, NaN leaves it as it is.
+    pub(crate) fn set_plot_size(&mut self, width: f64, height: f64) {
+        let set = |size: f64, before| if size.is_nan() { before } else { (size > 0.0).then_some(size) };
+        self.plot_size = (set(width, self.plot_size.0), set(height, self.plot_size.1));
+        self.scale_to_frame();
+    }
+
+    /// The page in the plot's own units, and its scale: frame / plot size in width and height (HP, PCL 5
+    /// Technical Reference, "HP-GL/2 Plot Horizontal Size").
+    fn scale_to_frame(&mut self) {
+        let Some(frame) = self.picture_frame else { return };
+        let (width, height) = (self.plot_size.0.unwrap_or(frame.x), self.plot_size.1.unwrap_or(frame.y));
+        self.plot_scale = Vec2::new(frame.x / width, frame.y / height);
         self.hard_clip = Rect::new(0.0, 0.0, width, height);
         self.page_set = true;
         self.reason = ProfileReason::PictureFrame;

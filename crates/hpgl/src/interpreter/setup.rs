@@ -207,15 +207,19 @@ impl Interpreter {
         self.set_pen_position(self.position);
     }
 
-    /// A PCL picture frame: the page of HP-GL/2, as far as its size is given.
+    /// A PCL picture frame: the page of HP-GL/2, as far as its size is given; or the size of the plot
+    /// that is scaled to the frame.
     pub(super) fn picture_frame(&mut self, p: &[f64]) {
-        let reach = self.frame.reach();
-        if let [width, height] = *p {
+        let [width, height, plot_width, plot_height] = *p else { return };
+        if !(width.is_nan() && height.is_nan()) {
+            let reach = self.frame.reach();
             let width = if width > 0.0 { width } else { reach.width() };
             let height = if height > 0.0 { height } else { reach.height() };
             self.frame.set_picture_frame(width, height);
-            self.set_pen_position(self.position);
         }
+        self.frame.set_plot_size(plot_width, plot_height);
+        self.frame_changed();
+        self.set_pen_position(self.position);
     }
 
     /// `SP`.

@@ -10,7 +10,8 @@ use crate::grammar::job::job_line;
 use crate::mnemonic::Mnemonic;
 
 /// Plotter units in a decipoint, the unit of picture frames: 1016 / 720.
-const PLU_PER_DECIPOINT: f64 = 1016.0 / 720.0;
+const PLU_PER_DECIPOINT: f64 = PLU_PER_INCH / 720.0;
+const PLU_PER_INCH: f64 = 1016.0;
 
 impl Parser<'_> {
     /// Hands a wrapper's sequence to the interpreter as a command.
@@ -64,12 +65,17 @@ impl Parser<'_> {
                         ("raster or other binary data is skipped".into(), None)
                     });
                 }
-                let (width, height) = pcl.frame;
-                if width.is_none() && height.is_none() {
+                let plu = |size: Option<f64>, unit: f64| size.map_or(f64::NAN, |size| size * unit);
+                let sizes = [
+                    plu(pcl.frame.0, PLU_PER_DECIPOINT),
+                    plu(pcl.frame.1, PLU_PER_DECIPOINT),
+                    plu(pcl.plot_size.0, PLU_PER_INCH),
+                    plu(pcl.plot_size.1, PLU_PER_INCH),
+                ];
+                if sizes.iter().all(|size| size.is_nan()) {
                     return None;
                 }
-                let plu = |decipoints: Option<f64>| decipoints.map_or(f64::NAN, |d| d * PLU_PER_DECIPOINT);
-                self.parameters.extend([plu(width), plu(height)]);
+                self.parameters.extend(sizes);
                 Some(self.wrapper(Mnemonic::PICTURE_FRAME, start))
             }
             Escape::Unknown => {
