@@ -20,14 +20,18 @@ pub struct Summary {
 impl Summary {
     /// The generation of the language: that of the newest command in it.
     pub fn generation(&self) -> Generation {
-        // What the first generation does not have; PS, PG, SM and the like are in both.
-        const SECOND: [&[u8; 2]; 26] = [
-            b"AC", b"AD", b"BP", b"BR", b"BZ", b"CF", b"CO", b"CR", b"DL", b"FI", b"FN", b"LA", b"LM", b"MG",
-            b"NP", b"PC", b"PE", b"PP", b"PW", b"QL", b"SB", b"SD", b"SV", b"TD", b"TR", b"WU",
-        ];
-        let second = self.used.iter().any(|(mnemonic, _)| SECOND.contains(&&mnemonic.0));
+        let second = self.used.iter().any(|(mnemonic, _)| is_second_generation(*mnemonic));
         if second || self.wrappers.pcl { Generation::HpGl2 } else { Generation::HpGl }
     }
+}
+
+/// Whether a command is of HP-GL/2 and not of HP-GL. `PS`, `PG`, `SM` and the like are of both.
+pub(crate) fn is_second_generation(mnemonic: Mnemonic) -> bool {
+    const SECOND: [&[u8; 2]; 26] = [
+        b"AC", b"AD", b"BP", b"BR", b"BZ", b"CF", b"CO", b"CR", b"DL", b"FI", b"FN", b"LA", b"LM", b"MG",
+        b"NP", b"PC", b"PE", b"PP", b"PW", b"QL", b"SB", b"SD", b"SV", b"TD", b"TR", b"WU",
+    ];
+    SECOND.contains(&&mnemonic.0)
 }
 
 /// A generation of the language.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{check, codes, document};
+use common::{check, codes, document, ink};
 
 #[test]
 fn open_comment_ends_at_semicolon() {
@@ -67,4 +67,21 @@ fn pcl_plot_size_scales_to_frame() {
         &["1: 0,0 4064,4064"],
         &[],
     );
+}
+
+#[test]
+fn label_terminator_prints_in_hpgl_only() {
+    let label = |before: &str, text: &str| {
+        let file = format!("{before}PU0,0;{text}SP0;");
+        ink(&document(file.as_bytes()))
+    };
+    // A printing terminator of HP-GL is drawn, too (7470A).
+    assert_eq!(label("IN;SP1;DT#;", "LBab#"), label("IN;SP1;", "LBab#\x03"));
+    // Not in HP-GL/2, whose mode 0 prints it; nor once DT; restores the usual one.
+    assert_eq!(label("BP;IN;SP1;DT#;", "LBab#"), label("BP;IN;SP1;", "LBab\x03"));
+    assert_eq!(label("IN;SP1;DT#;", "LBab#PW.3;"), label("IN;SP1;", "LBab\x03PW.3;"));
+    assert_eq!(label("BP;IN;SP1;DT#,0;", "LBab#"), label("BP;IN;SP1;", "LBab#\x03"));
+    assert_eq!(label("IN;SP1;DT#;DT;", "LBab\x03"), label("IN;SP1;", "LBab\x03"));
+    // Control characters do what they do: LF moves to the next line.
+    assert_eq!(label("IN;SP1;DT\n;", "LBa\nLBb\n"), label("IN;SP1;", "LBa\n\x03LBb\x03"));
 }

@@ -16,6 +16,7 @@ use crate::codes;
 use crate::grammar::bytes::{Class, class, gap, unread};
 use crate::grammar::name::Form;
 use crate::mnemonic::Mnemonic;
+use crate::summary::is_second_generation;
 use crate::syntax::{Command, Entry, Syntax};
 pub(crate) use state::Parser;
 use state::{Head, Language, Step};
@@ -136,5 +137,21 @@ impl<'a> Parser<'a> {
             Form::Comment => self.comment(mnemonic, start),
             Form::Encoded => self.encoded(mnemonic, start),
         }
+    }
+
+    /// Whether the file is HP-GL/2: reads all of it once, up to the first sign of that.
+    fn is_hpgl2(&mut self) -> bool {
+        if let Some(known) = self.is_hpgl2 {
+            return known;
+        }
+        let mut ahead = Parser::new(self.bytes, Some(self.default_terminator));
+        // Ends the recursion. Printed or not, a terminator ends its label at the same byte.
+        ahead.is_hpgl2 = Some(true);
+        let mut second = false;
+        while !second && let Some(head) = ahead.head() {
+            second = is_second_generation(head.mnemonic) || ahead.hints.wrappers.pcl;
+        }
+        self.is_hpgl2 = Some(second);
+        second
     }
 }

@@ -58,9 +58,9 @@ pub(crate) struct Parser<'a> {
     /// What is still to be read of them.
     pub(super) rest: Input<'a>,
     pub(super) language: Language,
-    default_terminator: u8,
+    pub(super) default_terminator: u8,
     pub(super) terminator: u8,
-    /// The terminator is printed too (`DT` with mode 0).
+    /// The terminator is printed too (`DT` with mode 0, or in HP-GL without a mode).
     pub(super) prints_terminator: bool,
     pub(super) number: usize,
     pub(super) parameters: Vec<f64>,
@@ -73,6 +73,8 @@ pub(crate) struct Parser<'a> {
     /// The next entry into HP-GL/2, once searched for.
     pub(super) next_entry: Searched,
     encoding_known: bool,
+    /// Whether the file is HP-GL/2, once that was asked for.
+    pub(super) is_hpgl2: Option<bool>,
 }
 
 impl<'a> Parser<'a> {
@@ -93,6 +95,7 @@ impl<'a> Parser<'a> {
             last: vec![Searched::NotYet; 256],
             next_entry: Searched::NotYet,
             encoding_known: false,
+            is_hpgl2: None,
         }
     }
 

@@ -58,7 +58,10 @@ impl Parser<'_> {
             Definition::Byte(byte) => self.terminator = byte,
         }
         self.number_list(mnemonic, LineEnds::Join, true);
-        self.prints_terminator = self.parameters.first() == Some(&0.0);
+        self.prints_terminator = match self.parameters.first() {
+            Some(&mode) => mode == 0.0,
+            None => !self.is_hpgl2(),
+        };
         Some(self.finish(mnemonic, start, Span { start: at, end: at + 1 }))
     }
 
