@@ -223,8 +223,9 @@ codes! {
         "CS, CA, SD or AD names a character set that is not built in. ISO 8859-1 is taken; bytes above 127, and a few signs \
          below, may come out as other characters than were meant."
     CUT_AT_PAGE = 225 "H0225" Warning "cut at the page"
-        "Ink outside the page that PS sets is not drawn, as on a plotter of HP-GL/2. The page begins at the origin and its \
-         longer side lies along x. If the ink should be drawn, the lengths of PS are too small."
+        "Ink outside the page that PS sets is not drawn, as on a plotter of HP-GL/2. The page begins at the origin. The \
+         first length of PS lies along x; or the longer one, where all ink fits then. If the ink should be drawn, the \
+         lengths of PS are too small."
     ASSUMED_PLOTTER = 226 "H0226" Note "scaling points assumed"
         "SC maps user units to the scaling points P1 and P2, and the file does not set them. Those of the plotter \
          named in the options are taken, else of a 7475A with A4 paper, or the corners of the page in HP-GL/2. The size of the \

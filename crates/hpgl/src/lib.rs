@@ -68,19 +68,21 @@ pub fn parse<'a>(bytes: &'a [u8], options: &Options) -> Syntax<'a> {
 ///
 /// The result is the same as that of [`interpret`] on [`parse`].
 pub fn read(bytes: &[u8], options: &Options) -> Document {
-    let mut parser = parser::Parser::new(bytes, options.label_terminator);
-    let mut interpreter = interpreter::Interpreter::new(options, bytes.len());
-    let mut placed = 0;
-    loop {
-        let before = interpreter.pen_position();
-        let more = parser.next().map(|command| interpreter.execute(&command)).is_some();
-        if parser.findings.len() > placed {
-            parser.findings.set_pen_position(placed, before);
-            placed = parser.findings.len();
+    interpreter::on_fitting_page(|page_axes| {
+        let mut parser = parser::Parser::new(bytes, options.label_terminator);
+        let mut interpreter = interpreter::Interpreter::new(options, page_axes, bytes.len());
+        let mut positioned = 0;
+        loop {
+            let before = interpreter.pen_position();
+            let more = parser.next().map(|command| interpreter.execute(&command)).is_some();
+            if parser.findings.len() > positioned {
+                parser.findings.set_pen_position(positioned, before);
+                positioned = parser.findings.len();
+            }
+            if !more {
+                break;
+            }
         }
-        if !more {
-            break;
-        }
-    }
-    interpreter.finish(parser.number(), parser.hints.wrappers, parser.findings)
+        interpreter.finish(parser.number(), parser.hints.wrappers, parser.findings)
+    })
 }

@@ -85,3 +85,18 @@ fn label_terminator_prints_in_hpgl_only() {
     // Control characters do what they do: LF moves to the next line.
     assert_eq!(label("IN;SP1;DT\n;", "LBa\nLBb\n"), label("IN;SP1;", "LBa\n\x03LBb\x03"));
 }
+
+#[test]
+fn page_size_order() {
+    // The first length lies along x: a portrait page.
+    check(
+        b"\x1b%-1BBP;IN;PS10160,16256;SP1;PU0,0;PD0,16000,10000,16000,10000,0,0,0;PU;PG;",
+        &["1: 0,0 0,16000 10000,16000 10000,0 0,0"],
+        &[],
+    );
+    check(b"BP;IN;PS2000,4000;SP1;SC0,1,0,1;PU0,0;PD1,1;", &["1: 0,0 2000,4000"], &[]);
+    // The longer one, where ink fits on such a page only.
+    check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD4000,2000;", &["1: 0,0 4000,2000"], &[]);
+    // It fits on neither: cut as written.
+    check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD6000,0;", &["1: 0,0 2000,0"], &["H0225"]);
+}

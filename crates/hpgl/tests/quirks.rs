@@ -379,8 +379,7 @@ fn windows() {
     // The page that PS sets clips, a default one does not.
     check(b"IN;SP1;PS4000,2000;PD4000,0,5000,0;", &["1: 0,0 4000,0"], &["H0225"]);
     check(b"IN;SP1;PD40000,0;", &["1: 0,0 40000,0"], &[]);
-    // The longer side of the page lies along x, whichever PS names first: real CAD files rely on
-    // it.
+    // A page whose longer side lies along x, where ink fits on that only: real CAD files rely on it.
     check(b"IN;SP1;PS2000,4000;PD4000,2000;", &["1: 0,0 4000,2000"], &[]);
     check(b"IN;SP1;PS2000,4000;RO90;PD2000,4000;", &["1: 0,0 0,2000"], &[]);
     check(b"IN;SP1;IW5,5,5,9;PD400,0;IW;PD400,400;", &["1: 400,0 400,400"], &["H0211", "H0210"]);

@@ -68,6 +68,17 @@ impl AxisMap {
     const IDENTITY: Self = Self { factor: Vec2::new(1.0, 1.0), shift: Vec2::ZERO };
 }
 
+/// How the two lengths of `PS` lie.
+///
+/// GhostPDL has the first one along x. CAD files exist that name the shorter one first and draw with x
+/// along the longer one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PageAxes {
+    /// The first one along x.
+    AsWritten,
+    LongerAlongX,
+}
+
 /// The map from coordinates of the file to the page.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
@@ -81,6 +92,9 @@ pub(crate) struct Frame {
     /// Unless the file set a page, its edges do not clip; a page of one length is open towards y.
     page_clip: Option<Rect>,
     page_set: bool,
+    page_axes: PageAxes,
+    /// `PS` set a page whose second length is the longer one.
+    portrait_seen: bool,
     /// Width and height of the picture frame of PCL, and of the plot that is scaled to it; plotter
     /// units.
     picture_frame: Option<Vec2>,
@@ -104,7 +118,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    pub(crate) fn new(options: &Options) -> Self {
+    pub(crate) fn new(options: &Options, page_axes: PageAxes) -> Self {
         let mut frame = Self {
             unit_mm: options.plotter_unit_mm,
             automatic: options.automatic,
@@ -113,6 +127,8 @@ impl Frame {
             hard_clip: options.hard_clip,
             page_clip: None,
             page_set: false,
+            page_axes,
+            portrait_seen: false,
             picture_frame: None,
             plot_size: (None, None),
             plot_scale: Vec2::new(1.0, 1.0),
@@ -318,13 +334,14 @@ impl Frame {
         self.turn.inverse() * position
     }
 
-    /// Sets the page, from the origin: x runs along its longer side, whichever of the two numbers
-    /// that is. P1 and P2 become its corners. A page of one length is a square that is open towards
-    /// y.
+    /// Sets the page, from the origin; P1 and P2 become its corners. A page of one length is a square
+    /// that is open towards y.
     pub(crate) fn set_page(&mut self, length: f64, width: Option<f64>) {
-        let (length, width) = match width {
-            Some(width) => (length.max(width), Some(length.min(width))),
-            None => (length, None),
+        let is_portrait = width.is_some_and(|width| width > length);
+        self.portrait_seen |= is_portrait;
+        let (length, width) = match (self.page_axes, width) {
+            (PageAxes::LongerAlongX, Some(width)) if is_portrait => (width, Some(length)),
+            _ => (length, width),
         };
         self.hard_clip = Rect::new(0.0, 0.0, length, width.unwrap_or(length));
         let open = crate::units::SANE_PLU;
@@ -385,6 +402,11 @@ impl Frame {
     /// Whether P1 and P2 are those of a plotter that the file does not name.
     pub(crate) fn points_are_assumed(&self) -> bool {
         self.points_assumed
+    }
+
+    /// Whether the order of the lengths of `PS` mattered.
+    pub(crate) fn portrait_seen(&self) -> bool {
+        self.portrait_seen
     }
 
     /// Whether the file set a window.

@@ -28,6 +28,7 @@ use crate::syntax::{Command, Syntax};
 use characters::Characters;
 use fill::FillType;
 use frame::Frame;
+pub(crate) use frame::PageAxes;
 use line_type::LineType;
 use pens::Pens;
 use polygon::Polygon;
@@ -36,18 +37,33 @@ use tracer::Tracer;
 
 /// Interprets the commands of a file.
 pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Document {
-    let mut interpreter = Interpreter::new(options, syntax.bytes.len());
-    let mut findings = syntax.findings.clone();
-    let mut placed = 0;
-    for (command, found) in syntax.commands().zip(syntax.findings_until()) {
-        if found > placed {
-            findings.set_pen_position(placed, interpreter.pen_position());
-            placed = found;
+    on_fitting_page(|page_axes| {
+        let mut interpreter = Interpreter::new(options, page_axes, syntax.bytes.len());
+        let mut findings = syntax.findings.clone();
+        let mut positioned = 0;
+        for (command, found) in syntax.commands().zip(syntax.findings_until()) {
+            if found > positioned {
+                findings.set_pen_position(positioned, interpreter.pen_position());
+                positioned = found;
+            }
+            interpreter.execute(&command);
         }
-        interpreter.execute(&command);
+        findings.set_pen_position(positioned, interpreter.pen_position());
+        interpreter.finish(syntax.command_count, syntax.hints.wrappers, findings)
+    })
+}
+
+/// Reads a file with the lengths of `PS` as they are written. Where that cuts ink off, and a page whose
+/// longer side lies along x does not, that one is meant.
+pub(crate) fn on_fitting_page(read: impl Fn(PageAxes) -> (Document, bool)) -> Document {
+    let (document, is_cut) = read(PageAxes::AsWritten);
+    if is_cut {
+        let (turned, is_cut) = read(PageAxes::LongerAlongX);
+        if !is_cut {
+            return turned;
+        }
     }
-    findings.set_pen_position(placed, interpreter.pen_position());
-    interpreter.finish(syntax.command_count, syntax.hints.wrappers, findings)
+    document
 }
 
 /// Limit of hatch lines, and of dashes: this number plus [`SEGMENTS_PER_BYTE`] times the size of
@@ -111,9 +127,9 @@ pub(crate) struct Interpreter {
 
 impl Interpreter {
     /// A plotter for a file of that many bytes.
-    pub(crate) fn new(options: &Options, length: usize) -> Self {
+    pub(crate) fn new(options: &Options, page_axes: PageAxes, length: usize) -> Self {
         let pieces = BASE_SEGMENT_BUDGET + SEGMENTS_PER_BYTE * length as u64;
-        let frame = Frame::new(options);
+        let frame = Frame::new(options, page_axes);
         let position_mm = frame.mm_of_plu(Point::ZERO);
         Self {
             frame,
@@ -390,13 +406,13 @@ impl Interpreter {
         self.pages.retain(|page| !page.drawing.is_empty());
     }
 
-    /// The end of the file.
+    /// The end of the file: the document, and whether ink was cut off at a page that might lie otherwise.
     pub(crate) fn finish(
         mut self,
         commands: usize,
         wrappers: Wrappers,
         syntax_findings: Findings,
-    ) -> Document {
+    ) -> (Document, bool) {
         if self.polygon.is_open() {
             self.report(codes::OPEN_POLYGON, || "the file ends inside a polygon (PM0 without PM2)".into());
         }
@@ -422,6 +438,8 @@ impl Interpreter {
             .filter(|&(_, count)| count > 0)
             .collect();
         let summary = Summary { commands, used, wrappers, profile };
-        Document { pages: self.pages, diagnostics, summary }
+        let is_cut = self.frame.portrait_seen()
+            && diagnostics.iter().any(|diagnostic| diagnostic.code == codes::CUT_AT_PAGE);
+        (Document { pages: self.pages, diagnostics, summary }, is_cut)
     }
 }
