@@ -100,3 +100,32 @@ fn page_size_order() {
     // It fits on neither: cut as written.
     check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD6000,0;", &["1: 0,0 2000,0"], &["H0225"]);
 }
+
+#[test]
+fn national_character_sets() {
+    let label = |set: u8, text: &str| ink(&document(format!("IN;SP1;CS{set};LB{text}\x03").as_bytes()));
+    let latin = |text: &str| ink(&document(format!("IN;SP1;LB{text}\x03").as_bytes()));
+    for (set, bytes, characters) in [
+        (0, "#$@[\\]^`{|}~", "#$@[\\]^`{|}~"),
+        (6, "#$@[\\]^`{|}", "#$@[¥]^`{|}"),
+        (9, "#$@[\\]^`{|}", "#¤@[\\]^`{|}"),
+        (30, "$@[\\]{|}", "¤@ÄÖÅäöå"),
+        (31, "$@[\\]^`{|}~", "¤ÉÄÖÅÜéäöåü"),
+        (32, "[\\]{|}", "ÆØÅæøå"),
+        (33, "@[\\]{|}~", "§ÄÖÜäöüß"),
+        (34, "#@[\\]`{|}~", "£à°ç§µéùè¨"),
+        (35, "#$@", "£$@"),
+        (36, "#@[\\]`{|}~", "£§°çéùàòèì"),
+        (37, "#@[\\]{|}", "£§¡Ñ¿°ñç"),
+        (38, "@[\\]{|}~", "§ÃÇÕãçõ°"),
+        (39, "#[\\]{|}~", "§ÆØÅæøå|"),
+    ] {
+        assert_eq!(label(set, bytes), latin(characters), "CS{set}");
+    }
+    // Sets without a source for their characters are reported by name.
+    let french = document(b"IN;SP1;CS2;LBa\x03");
+    assert_eq!(
+        french.diagnostics[0].message,
+        "character set 2 (French/German) is not built in; ISO 8859-1 is taken"
+    );
+}

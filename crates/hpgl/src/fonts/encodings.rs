@@ -25,24 +25,42 @@ pub(crate) enum CharacterSet {
 const NATIONAL: &[u8] = b"#$@[\\]^`{|}~";
 
 impl CharacterSet {
-    /// The set of a 7475A's `CS` and `CA`, if it is known here.
+    /// The set of the `CS` and `CA` of HP-GL plotters, if its characters are known here.
     ///
-    /// The numbers of national sets follow ISO 646 registrations: 30 Swedish, 31 the same for
-    /// names, 32 Norwegian, 33 German, 34 French, 35 British, 36 Italian, 37 Spanish, 38
-    /// Portuguese, 39 Norwegian 2.
+    /// 30 to 39 are sets of ISO 646 by their registrations (ISO-IR): 30 Swedish (10), 31 the
+    /// same for names (11), 32 and 39 Norwegian (60 and 61), 33 German (21), 34 French (69), 35 British
+    /// (4), 36 Italian (15), 37 Spanish (17), 38 Portuguese (16). 6 is the Roman half of JIS X 0201
+    /// (14), 9 the international reference version (2).
     pub(crate) fn of_plotter(number: f64) -> Option<Self> {
         Some(match number as i32 {
-            0 | 6 | 9 => Self::Latin1,
+            0 => Self::Latin1,
+            6 => Self::Iso646("#$@[¥]^`{|}¯"),
             7 => Self::RomanExtensions,
+            9 => Self::Iso646("#¤@[\\]^`{|}¯"),
             30 => Self::Iso646("#¤@ÄÖÅ^`äöå~"),
             31 => Self::Iso646("#¤ÉÄÖÅÜéäöåü"),
-            32 | 39 => Self::Iso646("#$@ÆØÅ^`æøå~"),
+            32 => Self::Iso646("#$@ÆØÅ^`æøå~"),
             33 => Self::Iso646("#$§ÄÖÜ^`äöüß"),
             34 => Self::Iso646("£$à°ç§^µéùè¨"),
             35 => Self::Iso646("£$@[\\]^`{|}~"),
             36 => Self::Iso646("£$§°çé^ùàòèì"),
             37 => Self::Iso646("£$§¡Ñ¿^`°ñç~"),
             38 => Self::Iso646("#$§ÃÇÕ^`ãçõ°"),
+            39 => Self::Iso646("§$@ÆØÅ^`æøå|"),
+            _ => return None,
+        })
+    }
+
+    /// The name of a set of HP-GL plotters whose characters are not known here (HP 7470A, Interfacing
+    /// and Programming Manual, page C-7, and 7475A).
+    pub(crate) fn name_of_plotter_set(number: f64) -> Option<&'static str> {
+        Some(match number as i32 {
+            1 => "HP 9825",
+            2 => "French/German",
+            3 => "Scandinavian",
+            4 => "Spanish/Latin American",
+            5 => "special symbols",
+            8 => "Katakana",
             _ => return None,
         })
     }

@@ -188,15 +188,23 @@ impl Interpreter {
     pub(super) fn character_set(&mut self, p: &[f64], alternate: bool) {
         let number = p.first().copied().unwrap_or(0.0);
         let set = CharacterSet::of_plotter(number);
-        self.set_character_set(set, number, alternate);
+        let name = CharacterSet::name_of_plotter_set(number);
+        self.set_character_set(set, number, name, alternate);
     }
 
-    fn set_character_set(&mut self, set: Option<CharacterSet>, number: f64, alternate: bool) {
+    fn set_character_set(
+        &mut self,
+        set: Option<CharacterSet>,
+        number: f64,
+        name: Option<&str>,
+        alternate: bool,
+    ) {
         let font = if alternate { &mut self.characters.alternate } else { &mut self.characters.standard };
         font.set = set.unwrap_or_default();
         if set.is_none() {
             self.report(codes::UNKNOWN_CHARACTER_SET, || {
-                format!("character set {number} is not known here; ISO 8859-1 is taken")
+                let name = name.map(|name| format!(" ({name})")).unwrap_or_default();
+                format!("character set {number}{name} is not built in; ISO 8859-1 is taken")
             });
         }
     }
@@ -209,7 +217,7 @@ impl Interpreter {
             match pair[0] as i32 {
                 1 => {
                     let set = CharacterSet::of_symbol_set(pair[1]);
-                    self.set_character_set(set, pair[1], alternate);
+                    self.set_character_set(set, pair[1], None, alternate);
                 }
                 2 => font.proportional = pair[1] == 1.0,
                 _ => {}
