@@ -119,12 +119,11 @@ pub(crate) enum Item {
     Unfinished,
 }
 
-/// A whole number, or why there is none.
+/// A whole number, or one without its last digit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Number {
     Value(f64),
     Unfinished,
-    Missing,
 }
 
 /// `number = { digit | filler } last-digit`, least significant digit first, the sign in the lowest
@@ -166,7 +165,7 @@ fn number(input: Input<'_>, base32: bool, reencoded: bool) -> Parsed<'_, Number>
             return Ok((rest, Number::Value(if value & 1 == 1 { -size } else { size })));
         }
     }
-    Ok((rest, if begun { Number::Unfinished } else { Number::Missing }))
+    if begun { Ok((rest, Number::Unfinished)) } else { mismatch(input) }
 }
 
 /// Takes the data apart.
@@ -184,14 +183,10 @@ impl<'a> Decoder<'a> {
         Self { rest: data, reencoded, base32: false, scale: 1.0 }
     }
 
-    fn number(&mut self) -> Number {
-        match number(self.rest, self.base32, self.reencoded) {
-            Ok((rest, number)) => {
-                self.rest = rest;
-                number
-            }
-            Err(_) => Number::Missing,
-        }
+    fn number(&mut self) -> Option<Number> {
+        let (rest, number) = number(self.rest, self.base32, self.reencoded).ok()?;
+        self.rest = rest;
+        Some(number)
     }
 
     fn next_item(&mut self) -> Option<Item> {
@@ -208,8 +203,8 @@ impl<'a> Decoder<'a> {
                 }
                 Kind::Digit => {
                     return match self.number() {
-                        Number::Value(value) => Some(Item::Coordinate(value * self.scale)),
-                        Number::Unfinished | Number::Missing => Some(Item::Unfinished),
+                        Some(Number::Value(value)) => Some(Item::Coordinate(value * self.scale)),
+                        Some(Number::Unfinished) | None => Some(Item::Unfinished),
                     };
                 }
                 Kind::Flag => self.rest = after,
@@ -221,9 +216,9 @@ impl<'a> Decoder<'a> {
                 b'7' => self.base32 = true,
                 _ => {
                     let value = match self.number() {
-                        Number::Value(value) => value,
-                        Number::Unfinished => return Some(Item::Unfinished),
-                        Number::Missing => continue,
+                        Some(Number::Value(value)) => value,
+                        Some(Number::Unfinished) => return Some(Item::Unfinished),
+                        None => continue,
                     };
                     if flag == b':' {
                         return Some(Item::Pen(value));

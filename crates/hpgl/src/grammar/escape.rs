@@ -95,7 +95,7 @@ pub(crate) struct Pcl {
 /// `pcl = family [ group ] { field }`, up to a field that ends in a capital letter, then its binary
 /// data.
 ///
-/// `family = "!" to "/" - "."`, `group = "`" to "~"`. Binary data inside a sequence are skipped as
+/// `family = "!" to "/" - "."`, `group = 0x60 to "~"`. Binary data inside a sequence are skipped as
 /// well; a damaged sequence ends after its last whole field.
 fn pcl(input: Input<'_>) -> Parsed<'_, Pcl> {
     let family = satisfy(|c| ('!'..='/').contains(&c) && c != '.');

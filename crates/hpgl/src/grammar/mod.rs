@@ -35,6 +35,6 @@ pub(crate) type Input<'a> = &'a [u8];
 pub(crate) type Parsed<'a, T> = nom::IResult<Input<'a>, T>;
 
 /// The error of a production that does not match.
-fn mismatch<'a, T>(input: Input<'a>) -> Parsed<'a, T> {
+fn mismatch<T>(input: Input<'_>) -> Parsed<'_, T> {
     Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Verify)))
 }

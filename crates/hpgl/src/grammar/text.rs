@@ -35,6 +35,7 @@ pub(crate) enum LabelEnd {
 /// (`terminated` is false), it ends at the next semicolon, or at a line end before a
 /// [`pen_command`]. Where one follows, but a pen command reads plainly after a semicolon before it,
 /// it ends at that semicolon.
+#[expect(clippy::unnecessary_wraps, reason = "it has the type of all productions")]
 pub(crate) fn label(input: Input<'_>, terminator: u8, terminated: bool) -> Parsed<'_, (Input<'_>, LabelEnd)> {
     let mut at = 0;
     let end = loop {

@@ -81,6 +81,7 @@ pub(crate) enum PageAxes {
 
 /// The map from coordinates of the file to the page.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts about the file")]
 pub(crate) struct Frame {
     unit_mm: f64,
     /// The file may choose the plotter.
@@ -97,7 +98,7 @@ pub(crate) struct Frame {
     portrait_seen: bool,
     /// Width and height of the picture frame of PCL, and of the plot that is scaled to it; plotter
     /// units.
-    picture_frame: Option<Vec2>,
+    pcl_size: Option<Vec2>,
     plot_size: (Option<f64>, Option<f64>),
     /// What the plot is scaled by in width and height.
     plot_scale: Vec2,
@@ -129,7 +130,7 @@ impl Frame {
             page_set: false,
             page_axes,
             portrait_seen: false,
-            picture_frame: None,
+            pcl_size: None,
             plot_size: (None, None),
             plot_scale: Vec2::new(1.0, 1.0),
             reason: if options.automatic { ProfileReason::Assumed } else { ProfileReason::Options },
@@ -169,7 +170,7 @@ impl Frame {
         self.hard_clip = self.default_hard_clip;
         self.page_clip = None;
         self.page_set = false;
-        self.picture_frame = None;
+        self.pcl_size = None;
         self.plot_size = (None, None);
         self.plot_scale = Vec2::new(1.0, 1.0);
         self.reason = if self.automatic { ProfileReason::Assumed } else { ProfileReason::Options };
@@ -416,7 +417,7 @@ impl Frame {
 
     /// Makes the picture frame of PCL the page without clipping to it.
     pub(crate) fn set_picture_frame(&mut self, width: f64, height: f64) {
-        self.picture_frame = Some(Vec2::new(width, height));
+        self.pcl_size = Some(Vec2::new(width, height));
         self.scale_to_frame();
     }
 
@@ -431,7 +432,7 @@ impl Frame {
     /// The page in the plot's own units, and its scale: frame / plot size in width and height (HP, PCL 5
     /// Technical Reference, "HP-GL/2 Plot Horizontal Size").
     fn scale_to_frame(&mut self) {
-        let Some(frame) = self.picture_frame else { return };
+        let Some(frame) = self.pcl_size else { return };
         let (width, height) = (self.plot_size.0.unwrap_or(frame.x), self.plot_size.1.unwrap_or(frame.y));
         self.plot_scale = Vec2::new(frame.x / width, frame.y / height);
         self.hard_clip = Rect::new(0.0, 0.0, width, height);

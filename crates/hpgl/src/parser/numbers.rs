@@ -164,7 +164,7 @@ impl<'a> Parser<'a> {
                 match number.value {
                     // NaN stands for a number out of range.
                     Some(value) => {
-                        self.parameters.push(if value.abs() < LARGEST_NUMBER { value } else { f64::NAN })
+                        self.parameters.push(if value.abs() < LARGEST_NUMBER { value } else { f64::NAN });
                     }
                     None if reports => self.report_stray(mnemonic, at),
                     None => {}
