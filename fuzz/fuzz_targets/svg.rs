@@ -1,4 +1,5 @@
-//! Arbitrary bytes, bare and inside an `svg` element: reading never panics, and gives finite strokes with pens.
+//! Arbitrary bytes, bare and inside an `svg` element: reading never panics, and gives finite
+//! strokes with pens.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! Length, strokes and findings of SVG files: `cargo run --release --example lengths -- [--outlines] FILE...`
+//! Length, strokes and findings of SVG files: `cargo run --release --example lengths --
+//! [--outlines] FILE...`
 
 #![expect(clippy::print_stdout, reason = "an example prints")]
 

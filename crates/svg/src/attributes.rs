@@ -10,7 +10,8 @@ const SVG: &str = "http://www.w3.org/2000/svg";
 const XLINK: &str = "http://www.w3.org/1999/xlink";
 pub(crate) const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
 
-/// The name of an element of SVG (or of no namespace, for files that forget it); nothing for foreign elements.
+/// The name of an element of SVG (or of no namespace, for files that forget it); nothing for
+/// foreign elements.
 pub(crate) fn name<'a>(node: Node<'a, '_>) -> Option<&'a str> {
     let tag = node.tag_name();
     (node.is_element() && tag.namespace().is_none_or(|namespace| namespace == SVG || namespace == "unknown"))

@@ -1,4 +1,5 @@
-//! Clip paths: strokes are cut where they cross the clip's outline, and stay lines, arcs and cubics.
+//! Clip paths: strokes are cut where they cross the clip's outline, and stay lines, arcs and
+//! cubics.
 
 use std::rc::Rc;
 
@@ -7,7 +8,8 @@ use drawing::{FillRule, Point, Rect, Segment, Vec2};
 use crate::meet;
 use crate::path::Subpath;
 
-/// Ink on the outline itself stays: half of its line would be visible. So close to the outline counts as on it, mm.
+/// Ink on the outline itself stays: half of its line would be visible. So close to the outline
+/// counts as on it, mm.
 const ON_EDGE_MM: f64 = 1e-7;
 /// Pieces shorter than this are rounding errors of crossings, mm.
 const SHORTEST_MM: f64 = 1e-9;
@@ -40,7 +42,8 @@ struct Edge {
 }
 
 impl Area {
-    /// The inside of subpaths (mm), each closed by a line if it is open; nothing if they have no extent.
+    /// The inside of subpaths (mm), each closed by a line if it is open; nothing if they have no
+    /// extent.
     pub(crate) fn new(subpaths: &[Subpath], rule: FillRule) -> Option<Self> {
         let mut edges: Vec<Edge> = Vec::new();
         for subpath in subpaths {
@@ -155,8 +158,8 @@ impl Region {
         }
     }
 
-    /// The parts of a piece inside the region, in order, as ranges of its parameter. Every pair looked at takes one
-    /// from `work`; without any left, crossings are missed.
+    /// The parts of a piece inside the region, in order, as ranges of its parameter. Every pair
+    /// looked at takes one from `work`; without any left, crossings are missed.
     pub(crate) fn inside(&self, piece: &Segment, work: &mut u64) -> Vec<(f64, f64)> {
         let mut cuts = vec![0.0, 1.0];
         self.crossings(piece, piece.bounding_box(), &mut cuts, work);

@@ -112,7 +112,8 @@ struct Rule {
 pub(crate) struct Sheet {
     rules: Vec<Rule>,
     blocks: Vec<Vec<(String, String, bool)>>,
-    /// Rules by the id, class or type that their last compound asks for (`#id`, `.class`, `type`, or empty).
+    /// Rules by the id, class or type that their last compound asks for (`#id`, `.class`, `type`,
+    /// or empty).
     by_key: BTreeMap<String, Vec<usize>>,
     /// What is not supported, for a finding.
     pub(crate) skipped: Vec<String>,

@@ -10,8 +10,8 @@ const ACCURACY: f64 = 1e-9;
 
 /// The dashes of a subpath, each a list of pieces; `None` where there would be more than `left`.
 ///
-/// `lengths` are dashes and gaps in turn, an even number of them. The pattern starts `offset` into itself at the start
-/// of every subpath.
+/// `lengths` are dashes and gaps in turn, an even number of them. The pattern starts `offset` into
+/// itself at the start of every subpath.
 pub(crate) fn cut(
     subpath: &Subpath,
     lengths: &[f64],

@@ -93,7 +93,8 @@ pub struct Diagnostic {
     pub line: usize,
     /// Column of the first place in characters, from 1.
     pub column: usize,
-    /// Name of the element, with `#` and its id if it has one; empty if the finding is about the file.
+    /// Name of the element, with `#` and its id if it has one; empty if the finding is about the
+    /// file.
     pub element: String,
     /// What was found there.
     pub message: String,

@@ -8,29 +8,31 @@
 //! assert!(document.diagnostics.is_empty());
 //! ```
 //!
-//! [`read`] never fails and never panics: what cannot be drawn is reported in [`Diagnostic`]s with line, column and
-//! element.
+//! [`read`] never fails and never panics: what cannot be drawn is reported in [`Diagnostic`]s with
+//! line, column and element.
 //!
 //! # Why a resolver of our own
 //!
-//! usvg resolves styles, references and clips well, but computes in `f32`, converts circles and arcs to cubics
-//! (0.027 mm off at a radius of 100 mm), drops layer labels and source positions, and drops text without a font. To
-//! recover the exact shape, every element would have to be tagged beforehand, and its transform, dashes, markers and
-//! clips computed again in `f64`: that is the resolver, next to a second one. So this crate resolves by itself, on
-//! `roxmltree` (XML, positions), `svgtypes` (paths, transforms, lengths, colours), `simplecss` (tokens of selectors)
-//! and `kurbo` (cubics). Selectors are matched here, because simplecss matches without a bound on work and counts
-//! specificity in `u8`.
+//! usvg resolves styles, references and clips well, but computes in `f32`, converts circles and
+//! arcs to cubics (0.027 mm off at a radius of 100 mm), drops layer labels and source positions,
+//! and drops text without a font. To recover the exact shape, every element would have to be tagged
+//! beforehand, and its transform, dashes, markers and clips computed again in `f64`: that is the
+//! resolver, next to a second one. So this crate resolves by itself, on `roxmltree` (XML,
+//! positions), `svgtypes` (paths, transforms, lengths, colours), `simplecss` (tokens of selectors)
+//! and `kurbo` (cubics). Selectors are matched here, because simplecss matches without a bound on
+//! work and counts specificity in `u8`.
 //!
 //! # Exactness
 //!
-//! Lines, circles, ellipses and `A` commands keep their shape under every transform ([`drawing::EllipticArc`]);
-//! quadratic curves become the same curves as cubics. Coordinates are `f64`, transcendental functions are `libm`'s: the
-//! same file gives the same bits on every platform.
+//! Lines, circles, ellipses and `A` commands keep their shape under every transform
+//! ([`drawing::EllipticArc`]); quadratic curves become the same curves as cubics. Coordinates are
+//! `f64`, transcendental functions are `libm`'s: the same file gives the same bits on every
+//! platform.
 //!
 //! # Bounded work
 //!
-//! Entity expansion, nesting, references, CSS matching, dashes, hatches and the size of the result have limits
-//! (see `limits.rs`); beyond them an error is reported and the rest is left out.
+//! Entity expansion, nesting, references, CSS matching, dashes, hatches and the size of the result
+//! have limits (see `limits.rs`); beyond them an error is reported and the rest is left out.
 
 mod attributes;
 mod clip;
@@ -63,9 +65,9 @@ pub use source::looks_like_svg;
 /// How pens are numbered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pens {
-    /// One pen per layer. A layer whose name begins with a number is drawn with that pen; the others take the free
-    /// numbers in order of appearance. Ink outside layers, and a drawing of fewer than two layers without numbers, is
-    /// numbered by colour.
+    /// One pen per layer. A layer whose name begins with a number is drawn with that pen; the
+    /// others take the free numbers in order of appearance. Ink outside layers, and a drawing of
+    /// fewer than two layers without numbers, is numbered by colour.
     #[default]
     Layers,
     /// One pen per colour, in order of first appearance.
@@ -139,7 +141,8 @@ pub struct Document {
 
 /// Reads an SVG file, plain or gzipped (`.svgz`).
 ///
-/// Spans of strokes and diagnostics are bytes of the file's text as UTF-8: of the uncompressed text for `.svgz`.
+/// Spans of strokes and diagnostics are bytes of the file's text as UTF-8: of the uncompressed text
+/// for `.svgz`.
 pub fn read(bytes: &[u8], options: &Options<'_>) -> Document {
     let mut findings = diagnostics::Findings::default();
     let Some(text) = source::text(bytes, &mut findings) else {

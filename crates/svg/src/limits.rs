@@ -1,5 +1,5 @@
-//! Bounds on work and memory for damaged or hostile files. A file of 20 MB stays below all of them unless it multiplies
-//! itself.
+//! Bounds on work and memory for damaged or hostile files. A file of 20 MB stays below all of them
+//! unless it multiplies itself.
 
 /// Bytes of text after decompression.
 pub(crate) const TEXT_BYTES: usize = 256 << 20;
@@ -27,7 +27,8 @@ pub(crate) const DASHES: u64 = 2_000_000;
 pub(crate) const HATCH_CROSSINGS: u64 = 5_000_000;
 /// Edges of clip paths built.
 pub(crate) const CLIP_EDGES: u64 = 2_000_000;
-/// Pairs of pieces and clip edges looked at; a pair of curves that come close counts a thousand times.
+/// Pairs of pieces and clip edges looked at; a pair of curves that come close counts a thousand
+/// times.
 pub(crate) const CLIP_PAIRS: u64 = 1_000_000_000;
 /// Largest distance from the page's origin, mm.
 pub(crate) const COORDINATE_MM: f64 = 25e6;

@@ -9,9 +9,9 @@ const MOST_CHORDS: usize = 256;
 /// Crossings of two curves are refined until both points are this close, mm.
 const CLOSE_MM: f64 = 1e-10;
 
-/// Adds the parameters strictly inside (0, 1) at which `piece` crosses `edge`. A touch may count or not; a piece that
-/// runs along the edge has no crossings but, possibly, at the edge's ends. Returns the work done, in tests of a pair's
-/// bounding boxes.
+/// Adds the parameters strictly inside (0, 1) at which `piece` crosses `edge`. A touch may count or
+/// not; a piece that runs along the edge has no crossings but, possibly, at the edge's ends.
+/// Returns the work done, in tests of a pair's bounding boxes.
 pub(crate) fn crossings(piece: &Segment, edge: &Segment, cuts: &mut Vec<f64>) -> u64 {
     let mut add = |t: f64| {
         if t > 0.0 && t < 1.0 {
@@ -117,7 +117,8 @@ fn cubic_roots(f: [f64; 4]) -> Vec<f64> {
     roots
 }
 
-/// Crossings of two curves: pairs of chords that come close, refined by Newton's method on both parameters.
+/// Crossings of two curves: pairs of chords that come close, refined by Newton's method on both
+/// parameters.
 fn curve_crossings(piece: &Segment, edge: &Segment, mut add: impl FnMut(f64)) -> u64 {
     let (one, other) = (chords(piece), chords(edge));
     let near = |a: Rect, b: Rect| {

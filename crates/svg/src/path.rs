@@ -94,7 +94,8 @@ impl Builder {
         self.push(Segment::Cubic(CubicBez::new(self.at, control1, control2, end)), end);
     }
 
-    /// The same curve as a cubic: its control points lie two thirds of the way to the one of the quadratic.
+    /// The same curve as a cubic: its control points lie two thirds of the way to the one of the
+    /// quadratic.
     fn quadratic(&mut self, control: Point, end: Point) {
         let toward = |from: Point| from + (2.0 / 3.0) * (control - from);
         self.cubic(toward(self.at), toward(end), end);
@@ -169,9 +170,11 @@ impl Builder {
     }
 }
 
-/// An `A` command: from `from` to `to` on an ellipse of those radii, turned by degrees (SVG 2, appendix B.2.4).
+/// An `A` command: from `from` to `to` on an ellipse of those radii, turned by degrees (SVG 2,
+/// appendix B.2.4).
 ///
-/// Nothing if the ends coincide or a radius is 0: then it is a line. Radii that are too small are scaled up.
+/// Nothing if the ends coincide or a radius is 0: then it is a line. Radii that are too small are
+/// scaled up.
 pub(crate) fn arc(
     from: Point,
     to: Point,
@@ -195,8 +198,8 @@ pub(crate) fn arc(
         rx *= scale;
         ry *= scale;
     }
-    // On the unit circle: chord ends at +-(u, v) from the chord's middle, the centre beside it at a distance of
-    // sqrt(1 - |(u, v)|^2).
+    // On the unit circle: chord ends at +-(u, v) from the chord's middle, the centre beside it at a
+    // distance of sqrt(1 - |(u, v)|^2).
     let (u, v) = (h.x / rx, h.y / ry);
     let squared = (u * u + v * v).min(1.0);
     let beside = ((1.0 - squared) / squared).max(0.0).sqrt();

@@ -15,8 +15,8 @@ pub(crate) struct Layer {
 }
 
 impl Layer {
-    /// The layer of a name. A `!` before it (AxiDraw's pause) does not count, nor does `pen` (Inkscape's
-    /// export of HP-GL takes the number after it).
+    /// The layer of a name. A `!` before it (`AxiDraw`'s pause) does not count, nor does `pen`
+    /// (Inkscape's export of HP-GL takes the number after it).
     pub(crate) fn new(name: &str) -> Self {
         let text = name.trim_start_matches(['!', ' ']);
         let is_pen = text.get(..3).is_some_and(|pen| pen.eq_ignore_ascii_case("pen"));
@@ -49,6 +49,14 @@ pub(crate) fn unescaped(id: &str) -> String {
         }
     }
     text + rest
+}
+
+/// What shares a pen.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Group {
+    Layer(usize),
+    Color([u8; 3]),
+    All,
 }
 
 /// What a stroke is numbered by, until all strokes are known: its layer and its colour.
@@ -91,13 +99,6 @@ impl Keys {
         let by_layer = pens == Pens::Layers && (layers.len() > 1 || numbered);
         let only = (layers.len() == 1).then(|| layers.first()).flatten();
 
-        /// What shares a pen.
-        #[derive(PartialEq, Eq, PartialOrd, Ord)]
-        enum Group {
-            Layer(usize),
-            Color([u8; 3]),
-            All,
-        }
         let taken: BTreeSet<u16> = if by_layer {
             layers.iter().filter_map(|&layer| self.layers[layer].number).collect()
         } else {

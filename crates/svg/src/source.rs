@@ -8,7 +8,8 @@ use crate::limits;
 
 const GZIP: &[u8] = &[0x1f, 0x8b];
 
-/// Whether the bytes look like SVG, plain or gzipped: markup whose first 64 KiB have an `svg` element.
+/// Whether the bytes look like SVG, plain or gzipped: markup whose first 64 KiB have an `svg`
+/// element.
 pub fn looks_like_svg(bytes: &[u8]) -> bool {
     let mut head = Vec::new();
     let window = 64 << 10;
@@ -18,7 +19,7 @@ pub fn looks_like_svg(bytes: &[u8]) -> bool {
     } else {
         head.extend(bytes.iter().take(window as usize));
     }
-    let text = decode(&head).map_or_else(|| latin1(&head), |text| text);
+    let text = decode(&head).unwrap_or_else(|| latin1(&head));
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if !text.starts_with('<') {
         return false;
@@ -66,7 +67,8 @@ pub(crate) fn text(bytes: &[u8], findings: &mut Findings) -> Option<String> {
     Some(latin1(bytes))
 }
 
-/// UTF-8 (a byte order mark stays, so that places remain those of the file) or, by its mark, UTF-16.
+/// UTF-8 (a byte order mark stays, so that places remain those of the file) or, by its mark,
+/// UTF-16.
 fn decode(bytes: &[u8]) -> Option<String> {
     let utf16 = |unit: fn([u8; 2]) -> u16| {
         let units = bytes[2..].chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));

@@ -16,8 +16,8 @@ const USUAL: &[(&str, &str)] = &[
     ("svg", "http://www.w3.org/2000/svg"),
 ];
 
-/// Parses the text and hands its tree to `work`; gives the text back for lines and columns, with what was inserted to
-/// repair it. No result (and a finding) where the text cannot be parsed.
+/// Parses the text and hands its tree to `work`; gives the text back for lines and columns, with
+/// what was inserted to repair it. No result (and a finding) where the text cannot be parsed.
 pub(crate) fn with_tree<T>(
     mut text: String,
     findings: &mut Findings,
@@ -231,7 +231,8 @@ fn declared(doctype: &str) -> BTreeMap<&str, &str> {
     entities
 }
 
-/// Bytes that the references in `text` expand to, or more than any limit where counting them takes too long.
+/// Bytes that the references in `text` expand to, or more than any limit where counting them takes
+/// too long.
 fn expanded(text: &str, entities: &BTreeMap<&str, &str>, depth: usize, work: &mut u64) -> u64 {
     let mut sizes: BTreeMap<&str, u64> = BTreeMap::new();
     let mut total: u64 = 0;

@@ -45,6 +45,7 @@ pub(crate) const MIDDLE_EM: f64 = 0.35;
 pub(crate) const HANGING_EM: f64 = 0.7;
 
 /// Computed properties.
+#[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
 #[derive(Clone, Debug)]
 pub(crate) struct Style<'a> {
     // Inherited.
@@ -169,7 +170,7 @@ impl<'a> Style<'a> {
         for d in &all {
             match d.name {
                 "font-size" => {
-                    style.font_size = font_size(d.value, self.font_size).unwrap_or(style.font_size)
+                    style.font_size = font_size(d.value, self.font_size).unwrap_or(style.font_size);
                 }
                 "color" => style.color = color(d.value).map_or(style.color, |(rgb, _)| rgb),
                 _ => {}
@@ -302,7 +303,8 @@ impl<'a> Style<'a> {
         Some((paint, opacity))
     }
 
-    /// The lengths of dashes and gaps in user units, an even number of them; nothing for a solid line.
+    /// The lengths of dashes and gaps in user units, an even number of them; nothing for a solid
+    /// line.
     pub(crate) fn dash_lengths(&self, basis: Basis) -> Option<Vec<f64>> {
         let lengths: Result<Vec<_>, _> = LengthListParser::from(self.dashes).collect();
         let lengths = lengths.ok()?.into_iter().map(|length| basis.user(length, Axis::Diagonal));

@@ -127,8 +127,8 @@ impl<'a> Letters<'a> {
             let index = self.list.len();
             // The innermost list that has a value for this character counts.
             let given = |which: usize| {
-                let lists = self.lists.iter().rev();
-                lists.filter_map(|lists| lists.values[which].get(index - lists.first).copied()).next()
+                let mut lists = self.lists.iter().rev();
+                lists.find_map(|lists| lists.values[which].get(index - lists.first).copied())
             };
             // The last rotation of a list goes on.
             let rotation = self.lists.iter().rev().find_map(|lists| {

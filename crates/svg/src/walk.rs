@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use drawing::{Affine, Drawing, Pen, Point, Rect, Span};
-use roxmltree::{Document, Node};
+use drawing::{Affine, Drawing, Pen, Span};
+use roxmltree::Node;
 
 use crate::attributes::{self, INKSCAPE};
-use crate::clip::{Area, Region};
+use crate::clip::Region;
 use crate::codes;
 use crate::css::Sheet;
 use crate::diagnostics::{Code, Findings};
@@ -18,7 +18,6 @@ use crate::pens::{self, Layer};
 use crate::shapes;
 use crate::style::{Paint, Style};
 use crate::units::{self, Axis, Basis};
-use crate::viewport;
 use crate::{Options, PenSettings};
 
 mod page;
@@ -339,7 +338,8 @@ impl<'a> Walker<'a, '_> {
     }
 }
 
-/// Whether a child of `switch` is the one to draw: no extensions required, and English or no language.
+/// Whether a child of `switch` is the one to draw: no extensions required, and English or no
+/// language.
 fn is_chosen(child: Element<'_>) -> bool {
     let no_extension = child.attribute("requiredExtensions").is_none_or(str::is_empty);
     let language = child.attribute("systemLanguage").is_none_or(|languages| {

@@ -1,7 +1,5 @@
 //! One test per feature of SVG, on small files of our own.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 use drawing::{Segment, Stroke};
 use svg::{Document, Options, Pen, Pens, Point, Severity, StrokeFont, StrokeGlyph};
 
@@ -293,7 +291,8 @@ fn fills_are_counted_or_hatched() {
     let options = Options { hatch: Some(hatch), ..Options::default() };
     let document = svg::read(page(content).as_bytes(), &options);
     assert!(document.diagnostics.is_empty());
-    // Length times spacing is the area, but for the ends of lines; the third shape has its outline too.
+    // Length times spacing is the area, but for the ends of lines; the third shape has its outline
+    // too.
     let ink = document.drawing.length() - 20.0;
     assert!((ink * 0.5 - (400.0 + 300.0 + 25.0)).abs() < 10.0, "{ink}");
 }

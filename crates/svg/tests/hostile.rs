@@ -1,5 +1,7 @@
 //! Hostile files end in an error, within bounds of time and memory.
 
+use std::fmt::Write as _;
+
 use svg::Options;
 
 const HEAD: &str =
@@ -16,9 +18,9 @@ fn entities_that_multiply_are_refused() {
         String::from("<!DOCTYPE svg [<!ENTITY a0 'aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa'>");
     for level in 1..9 {
         let before = format!("&a{};", level - 1).repeat(20);
-        text += &format!("<!ENTITY a{level} '{before}'>");
+        write!(text, "<!ENTITY a{level} '{before}'>").unwrap();
     }
-    text += &format!("]>{HEAD}<text>&a8;</text></svg>");
+    write!(text, "]>{HEAD}<text>&a8;</text></svg>").unwrap();
     assert_eq!(codes(&text), ["S0103"]);
 }
 
@@ -55,7 +57,8 @@ fn deep_nesting_is_refused() {
 fn references_that_multiply_end() {
     let mut text = format!("{HEAD}<defs><path id='u0' d='M0 0H1'/>");
     for level in 1..40 {
-        text += &format!("<g id='u{level}'>{}</g>", format!("<use href='#u{}'/>", level - 1).repeat(10));
+        let below = format!("<use href='#u{}'/>", level - 1).repeat(10);
+        write!(text, "<g id='u{level}'>{below}</g>").unwrap();
     }
     text += "</defs><use href='#u39'/></svg>";
     assert_eq!(codes(&text), ["S0103"]);

@@ -1,4 +1,5 @@
-//! Properties on random input: transforms compose, arcs are exact, clips and hatches conserve length and area.
+//! Properties on random input: transforms compose, arcs are exact, clips and hatches conserve
+//! length and area.
 
 use drawing::{Affine, Point, Segment};
 use proptest::prelude::*;
@@ -55,7 +56,8 @@ proptest! {
         let Some(Segment::Arc(arc)) = document.drawing.strokes[0].segments().next() else { panic!("no arc") };
         prop_assert!((arc.eval(0.0) - Point::new(x0, 200.0 - y0)).hypot2().sqrt() < 1e-9);
         prop_assert!((arc.eval(1.0) - Point::new(x1, 200.0 - y1)).hypot2().sqrt() < 1e-9);
-        // In the file's frame: turned back by the rotation, the point satisfies the equation of the ellipse.
+        // In the file's frame: turned back by the rotation, the point satisfies the equation of the
+        // ellipse.
         let (sin, cos) = libm::sincos(degrees.to_radians());
         let scale = arc.semi_axes().0 / rx.max(ry);
         prop_assert!(scale > 1.0 - 1e-9);

@@ -1,7 +1,23 @@
 //! The outermost `svg` element: style sheets, size, pixels per inch, layers.
 
-use super::*;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use drawing::{Affine, Drawing};
+use roxmltree::{Document, Node};
+
+use super::{Element, Result, Scope, Walker};
+use crate::Options;
+use crate::attributes::{self, INKSCAPE};
+use crate::codes;
+use crate::css::Sheet;
+use crate::diagnostics::Findings;
+use crate::limits;
+use crate::output::Output;
+use crate::style::Style;
+use crate::units;
 use crate::units::{CSS_DPI, MM_PER_INCH};
+use crate::viewport;
 
 /// Pixels per inch in files of Illustrator.
 const ILLUSTRATOR_DPI: f64 = 72.0;

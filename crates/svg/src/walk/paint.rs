@@ -1,7 +1,13 @@
 //! Strokes, fills and markers of shapes.
 
-use super::*;
+use std::rc::Rc;
+
+use super::{Element, Scope, Walker};
+use crate::attributes;
+use crate::codes;
+use crate::path::Subpath;
 use crate::shapes::Shape;
+use crate::style::Paint;
 use crate::{dashes, markers};
 
 /// References from gradient to gradient followed for the first colour.
@@ -82,7 +88,9 @@ impl<'a> Walker<'a, '_> {
         if let Some(path_length) = path_length.filter(|length| *length > 0.0) {
             let segments = shape.subpaths.iter().flat_map(|subpath| &subpath.segments);
             let scale = segments.map(drawing::Segment::length).sum::<f64>() / path_length;
-            lengths.iter_mut().for_each(|length| *length *= scale);
+            for length in &mut lengths {
+                *length *= scale;
+            }
             offset *= scale;
         }
         for subpath in &shape.subpaths {

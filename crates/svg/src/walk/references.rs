@@ -1,6 +1,14 @@
 //! `use`, `symbol` and nested `svg`.
 
-use super::*;
+use std::rc::Rc;
+
+use drawing::Affine;
+
+use super::{Element, Scope, Walker};
+use crate::attributes;
+use crate::codes;
+use crate::units::{self, Axis};
+use crate::viewport;
 
 impl<'a> Walker<'a, '_> {
     /// The element that a reference names, unless it contains the reference itself.
@@ -29,7 +37,8 @@ impl<'a> Walker<'a, '_> {
         Scope { references: Rc::new(references), depth: scope.depth + 1, ..scope.clone() }
     }
 
-    /// The scope of what is referred to but for its map and style; nothing where nothing more may be drawn.
+    /// The scope of what is referred to but for its map and style; nothing where nothing more may
+    /// be drawn.
     pub(crate) fn content_scope(&mut self, scope: &Scope<'a>, target: Element<'a>) -> Option<Scope<'a>> {
         let inner = Self::referring(scope, target);
         self.may_enter(target, &inner).then_some(inner)
@@ -58,7 +67,8 @@ impl<'a> Walker<'a, '_> {
         }
     }
 
-    /// Draws the content of a nested `svg` or a `symbol` in its viewport. `size` is that of the reference.
+    /// Draws the content of a nested `svg` or a `symbol` in its viewport. `size` is that of the
+    /// reference.
     pub(super) fn nested(&mut self, node: Element<'a>, scope: &Scope<'a>, size: Option<[Option<f64>; 2]>) {
         let basis = scope.basis();
         let length =

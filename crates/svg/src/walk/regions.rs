@@ -1,6 +1,20 @@
 //! Clip paths as regions on the page.
 
-use super::*;
+use std::rc::Rc;
+
+use drawing::{Affine, Point, Rect};
+use roxmltree::Node;
+
+use super::{Element, Scope, Walker};
+use crate::attributes;
+use crate::clip::{Area, Region};
+use crate::codes;
+use crate::limits;
+use crate::output::Refused;
+use crate::path::{self, Subpath};
+use crate::shapes;
+use crate::style::Style;
+use crate::units::{self, Axis, Basis};
 
 /// A clip path, and the map and bounding box that it was built for.
 pub(super) type Key = (usize, [u64; 6], [u64; 4]);
@@ -9,7 +23,8 @@ pub(super) type Key = (usize, [u64; 6], [u64; 4]);
 const CACHE: usize = 4096;
 
 impl<'a> Walker<'a, '_> {
-    /// Applies the element's clip path to its scope. `bounds` gives its bounding box in user units, where it is known.
+    /// Applies the element's clip path to its scope. `bounds` gives its bounding box in user units,
+    /// where it is known.
     pub(super) fn clip(
         &mut self,
         node: Element<'a>,
@@ -39,7 +54,8 @@ impl<'a> Walker<'a, '_> {
         (attributes::name(target) == Some("clipPath")).then_some(target)
     }
 
-    /// The region of a clip path for an element with that scope; nothing (and a finding) if it cannot be applied.
+    /// The region of a clip path for an element with that scope; nothing (and a finding) if it
+    /// cannot be applied.
     fn region(
         &mut self,
         node: Element<'a>,
