@@ -179,10 +179,11 @@ impl Findings {
             let line = lines.partition_point(|&start| start <= at).max(1);
             let begin = lines[line - 1];
             diagnostic.line = line;
-            diagnostic.column = text.get(begin..at).map_or(1, |before| before.chars().count() + 1);
+            let count = |from: usize, to: usize| text.get(from..to).map_or(0, |part| part.chars().count());
+            diagnostic.column = count(begin, at) + 1;
             if let Some((place, length)) = self.inserted {
-                if at >= place + length && begin <= place {
-                    diagnostic.column -= length;
+                if begin <= place && place <= at {
+                    diagnostic.column = count(begin, place) + count((place + length).min(at), at) + 1;
                 }
                 for byte in [&mut diagnostic.span.start, &mut diagnostic.span.end] {
                     if *byte > place {

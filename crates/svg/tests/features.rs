@@ -466,6 +466,13 @@ fn undeclared_prefixes_are_repaired() {
 }
 
 #[test]
+fn undeclared_prefix_outside_ascii_has_a_column() {
+    let document = svg::read("<svg ÿÿÿÿÿÿÿÿÿÿ:x='1'><a".as_bytes(), &Options::default());
+    assert_eq!(document.diagnostics.len(), 2);
+    assert!(document.diagnostics.iter().all(|found| found.line == 1 && found.column <= 26));
+}
+
+#[test]
 fn malformed_xml_has_a_place() {
     let document = svg::read(b"<svg xmlns='http://www.w3.org/2000/svg'>\n <g></svg>", &Options::default());
     let found = &document.diagnostics[0];
