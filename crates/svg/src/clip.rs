@@ -63,7 +63,10 @@ impl Area {
             }
         }
         let bounds = edges.iter().map(|edge| edge.bounds).reduce(|bounds, other| bounds.union(other))?;
-        let count = edges.len().clamp(1, 4096);
+        // So many bands that an edge lies in four of them on average.
+        let heights: f64 = edges.iter().map(|edge| edge.bounds.height()).sum();
+        let most = 4.0 * edges.len() as f64 * bounds.height() / heights;
+        let count = most.min(edges.len() as f64).clamp(1.0, 4096.0) as usize;
         let mut area = Self { rule, edges, bounds, bands: vec![Vec::new(); count], within: None };
         for index in 0..area.edges.len() {
             let bounds = area.edges[index].bounds;
@@ -86,13 +89,18 @@ impl Area {
     }
 
     /// Winding number (or crossings, by even-odd) of a ray to the right.
-    fn contains(&self, p: Point) -> bool {
+    fn contains(&self, p: Point, work: &mut u64) -> bool {
         let bounds = self.bounds;
         if p.x < bounds.x0 || p.x > bounds.x1 || p.y < bounds.y0 || p.y > bounds.y1 {
             return false;
         }
         let mut winding = 0;
-        for &index in &self.bands[self.band(p.y, 0.0)] {
+        let band = &self.bands[self.band(p.y, 0.0)];
+        *work = work.saturating_sub(band.len() as u64);
+        if *work == 0 {
+            return false;
+        }
+        for &index in band {
             let edge = &self.edges[index as usize];
             let rises = edge.from_y <= p.y && p.y < edge.to_y;
             let falls = edge.to_y <= p.y && p.y < edge.from_y;
@@ -125,12 +133,11 @@ impl Edge {
 }
 
 impl Region {
-    fn contains(&self, p: Point) -> bool {
-        self.within.as_ref().is_none_or(|region| region.contains(p))
-            && self
-                .areas
-                .iter()
-                .any(|area| area.contains(p) && area.within.as_ref().is_none_or(|region| region.contains(p)))
+    fn contains(&self, p: Point, work: &mut u64) -> bool {
+        self.within.as_ref().is_none_or(|region| region.contains(p, work))
+            && self.areas.iter().any(|area| {
+                area.contains(p, work) && area.within.as_ref().is_none_or(|region| region.contains(p, work))
+            })
     }
 
     /// All crossings of a piece with the region's outlines.
@@ -140,14 +147,18 @@ impl Region {
             if !overlap(reach, area.bounds) {
                 continue;
             }
-            for band in area.bands_of(bounds.y0, bounds.y1) {
-                *work = work.saturating_sub(1 + area.bands[band].len() as u64);
-                for &index in &area.bands[band] {
-                    let edge = &area.edges[index as usize];
-                    if *work > 0 && overlap(reach, edge.bounds) {
-                        *work = work.saturating_sub(meet::crossings(piece, &edge.segment, cuts));
-                    }
+            let bands = &area.bands[area.bands_of(bounds.y0, bounds.y1)];
+            let mut meet = |edge: &Edge| {
+                *work = work.saturating_sub(1);
+                if *work > 0 && overlap(reach, edge.bounds) {
+                    *work = work.saturating_sub(meet::crossings(piece, &edge.segment, cuts));
                 }
+            };
+            // An edge may lie in many bands: all edges once may be fewer.
+            if bands.iter().map(Vec::len).sum::<usize>() < area.edges.len() {
+                bands.iter().flatten().for_each(|&index| meet(&area.edges[index as usize]));
+            } else {
+                area.edges.iter().for_each(meet);
             }
             if let Some(region) = &area.within {
                 region.crossings(piece, bounds, cuts, work);
@@ -171,7 +182,7 @@ impl Region {
             if (to - from) * derivative.hypot2().sqrt() < SHORTEST_MM && to < 1.0 {
                 continue;
             }
-            if self.contains_nearly(piece.eval(middle), derivative) {
+            if self.contains_nearly(piece.eval(middle), derivative, work) {
                 match parts.last_mut() {
                     Some(last) if last.1 == from => last.1 = to,
                     _ => parts.push((from, to)),
@@ -186,18 +197,19 @@ impl Region {
     }
 
     /// Whether a point of a piece, or one of its neighbours across the piece, is inside.
-    fn contains_nearly(&self, p: Point, along: Vec2) -> bool {
+    fn contains_nearly(&self, p: Point, along: Vec2, work: &mut u64) -> bool {
         let length = along.hypot2().sqrt();
-        if self.contains(p) || length == 0.0 {
-            return self.contains(p);
+        let is_inside = self.contains(p, work);
+        if is_inside || length == 0.0 {
+            return is_inside;
         }
         let across = ON_EDGE_MM / length * Vec2::new(-along.y, along.x);
-        self.contains(p + across) || self.contains(p - across)
+        self.contains(p + across, work) || self.contains(p - across, work)
     }
 
     /// Whether a dot is inside.
-    pub(crate) fn has(&self, p: Point) -> bool {
-        self.contains(p)
+    pub(crate) fn has(&self, p: Point, work: &mut u64) -> bool {
+        self.contains(p, work)
     }
 }
 

@@ -178,7 +178,7 @@ fn clipped(
     let Some(first) = run.first() else { return Vec::new() };
     let is_dot = run.iter().all(|piece| matches!(piece, Segment::Line(line) if line.p0 == line.p1));
     if is_dot {
-        let stays = dots && region.has(first.start());
+        let stays = dots && region.has(first.start(), work);
         return if stays { vec![(run.to_vec(), closed)] } else { Vec::new() };
     }
     let mut runs: Vec<Vec<Segment>> = Vec::new();
