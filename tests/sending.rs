@@ -429,11 +429,13 @@ fn end_with(signal: &str, child: Child) -> (Duration, Output) {
 #[test]
 fn signals_end_commands_within_half_a_second() {
     let desk = Desk::new(DRAWING);
+    std::fs::write(desk.path("lines.txt"), "a line of 26 characters...\n".repeat(40_000)).expect("a file");
     for protocol in ["ticks", "xy-serial", "gcode", "ebb", "raw"] {
         for signal in ["-INT", "-TERM"] {
             // Nobody answers; with raw the port takes no more bytes.
             let (_ours, name) = silent_port();
-            let mut sender = desk.send(protocol, &name, &[]);
+            let file = if protocol == "raw" { "lines.txt" } else { "plan.ticks" };
+            let mut sender = desk.command(&["send", file, "--protocol", protocol, "--port", &name]);
             let sender = sender.stderr(Stdio::piped()).spawn().expect("the program runs");
             thread::sleep(Duration::from_millis(700));
             let (took, output) = end_with(signal, sender);

@@ -264,7 +264,7 @@ impl Operator {
             }
             self.waiting = waiting;
         }
-        if self.waiting.is_some() && self.confirmations > 0 {
+        if matches!(self.waiting, Some(Waiting::Machine(_))) && self.confirmations > 0 {
             self.confirmations -= 1;
             session.resume(now_us);
         }
@@ -272,7 +272,7 @@ impl Operator {
 
     fn confirm(&mut self, session: &mut dyn Session, now_us: u64) {
         if self.waiting.is_some() {
-            self.pausing = false;
+            self.pausing &= self.waiting != Some(Waiting::Operator);
             session.resume(now_us);
         } else if !self.interactive {
             self.confirmations += 1;
@@ -281,7 +281,7 @@ impl Operator {
 
     /// Pauses at the next pen-up, or resumes.
     fn pause(&mut self, session: &mut dyn Session, now_us: u64) {
-        self.pausing = !self.pausing;
+        self.pausing = !self.pausing && session.waiting_for() != Some(Waiting::Operator);
         if self.pausing {
             session.pause();
             terminal::say("pausing at the next pen-up; p resumes\n");
