@@ -193,7 +193,7 @@ impl EncodedTable {
         Ok(Program { lines, first_row, source: Source::Table(Box::new(self)) })
     }
 
-    fn from_row(&self, row: u64, position: Option<[i64; 2]>) -> Result<Program, ProgramError> {
+    fn resumed_at(&self, row: u64, position: Option<[i64; 2]>) -> Result<Program, ProgramError> {
         let last = self.table.rows.len() as u64 - 1;
         if row > last {
             return Err(ProgramError::NoRow { row, last });
@@ -276,7 +276,7 @@ impl Program {
     /// When there is no such row, or its rows cannot be encoded.
     pub fn from_row(&self, row: u64, position: Option<[i64; 2]>) -> Result<Self, ProgramError> {
         let language = match &self.source {
-            Source::Table(table) => return table.from_row(row, position),
+            Source::Table(table) => return table.resumed_at(row, position),
             Source::Language(language) => Some(language),
             Source::Opaque => None,
         };

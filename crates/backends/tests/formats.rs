@@ -87,13 +87,13 @@ fn write(
     machine: &Machine,
     rows: &[ExactRow],
     period_us: u64,
-    encode: &EncodeOptions,
+    encode: EncodeOptions,
     out: &mut Vec<u8>,
 ) -> Result<(), WriteError> {
     let (header, drawing) = (header(rows, period_us), drawing());
     let iterate = || -> RowIter<'_> { Box::new(rows.iter().copied()) };
     let source = PlanSource::new(&header, &iterate).on_machine(machine).of_drawing(&drawing);
-    backend.write(&source, encode, out)
+    backend.write(&source, &encode, out)
 }
 
 /// What each format writes, by its name.
@@ -111,7 +111,7 @@ fn written() -> Vec<(&'static str, String)> {
             // The board's own pen setting in place of a servo's.
             let encode = if backend.name().starts_with("ebb") { EncodeOptions::default() } else { encode };
             let mut bytes = Vec::new();
-            write(*backend, &machine(mechanism), &rows(), 10_000, &encode, &mut bytes)
+            write(*backend, &machine(mechanism), &rows(), 10_000, encode, &mut bytes)
                 .expect("a sound plan can be written");
             (backend.name(), String::from_utf8(bytes).expect("text").replace('\r', "\r\n"))
         })
@@ -177,7 +177,7 @@ fn unrepresentable_plans_are_refused_before_anything_is_written() {
     let cartesian = machine(Arc::new(Cartesian));
     let mut refused = |name: &str, rows: &[ExactRow], period_us: u64| {
         let backend = backends::find(name).expect(name);
-        match write(backend, &cartesian, rows, period_us, &EncodeOptions::default(), &mut out) {
+        match write(backend, &cartesian, rows, period_us, EncodeOptions::default(), &mut out) {
             Err(WriteError::Unrepresentable(why)) => why,
             other => panic!("{name}: {other:?}"),
         }

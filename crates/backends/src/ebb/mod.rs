@@ -34,7 +34,7 @@ pub(crate) enum Ebb {
 }
 
 impl Ebb {
-    fn encoder(self, options: &EncodeOptions) -> EbbEncoder {
+    fn encoder(self, options: EncodeOptions) -> EbbEncoder {
         let moves = if self == Self::Stepper || options.legacy_moves {
             encode::Moves::Stepper
         } else {
@@ -88,7 +88,7 @@ impl Backend for Ebb {
     }
 
     fn program(&self, plan: &PlanSource<'_>, options: &EncodeOptions) -> Result<Program, ProgramError> {
-        Program::of_table(plan.table(), Arc::new(self.encoder(options)))
+        Program::of_table(plan.table(), Arc::new(self.encoder(*options)))
     }
 
     fn write(
@@ -97,7 +97,7 @@ impl Backend for Ebb {
         options: &EncodeOptions,
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
-        let EbbEncoder { moves, pen } = self.encoder(options);
+        let EbbEncoder { moves, pen } = self.encoder(*options);
         encode::write(plan.rows(), moves, pen, out)
     }
 

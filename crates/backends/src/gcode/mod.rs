@@ -37,7 +37,7 @@ fn options(
     flavour: Flavour,
     format: &'static str,
     plan: &PlanSource<'_>,
-    options: &EncodeOptions,
+    options: EncodeOptions,
 ) -> Result<encode::Options, crate::Unrepresentable> {
     let lift = plan.machine(format)?.pen();
     let pen = if options.pen_actuator == Some(PenActuator::Z) {
@@ -106,7 +106,7 @@ impl Backend for Paths {
         encode: &EncodeOptions,
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
-        let options = options(self.0, self.name(), plan, encode)?;
+        let options = options(self.0, self.name(), plan, *encode)?;
         let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
         let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, plan.rows(), machine.pen().max_speed_mm_s);
         let park = machine.mechanism().forward(&machine.start());
@@ -114,7 +114,7 @@ impl Backend for Paths {
     }
 
     fn program(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Result<Program, ProgramError> {
-        let options = options(self.0, self.name(), plan, encode)?;
+        let options = options(self.0, self.name(), plan, *encode)?;
         Ok(program::program(encode::timed(plan.setpoints(self.name())?, &options, false)))
     }
 
@@ -167,7 +167,7 @@ impl Backend for Timed {
         encode: &EncodeOptions,
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
-        let options = options(Flavour::Grbl, self.name(), plan, encode)?;
+        let options = options(Flavour::Grbl, self.name(), plan, *encode)?;
         let lines: Vec<Line> = encode::timed(plan.setpoints(self.name())?, &options, true);
         encode::write(&lines, out)
     }

@@ -21,8 +21,8 @@ pub(super) fn program(lines: impl IntoIterator<Item = Line>) -> Program {
     let mut program: Vec<Line> = Vec::new();
     for mut line in lines {
         if let Some((code, comment)) = line.text.split_once(';') {
-            line.comment = comment.trim().to_owned();
-            line.text = code.trim_end().to_owned();
+            let (code, comment) = (code.trim_end().to_owned(), comment.trim().to_owned());
+            line = Line { text: code, comment, ..line };
         }
         let moved = state.accept(&line.text);
         // A program begins by lifting the pen: the lines before its first travel, mode words apart.
