@@ -16,7 +16,7 @@
 //! 5. `trajectory`: strokes, travel in joint space, pen lifts and drops in sequence, sampled at a
 //!    fixed period. Ticks are rounded from exact positions, so rounding errors do not accumulate.
 //!
-//! [`plan`] expects a drawing in machine mm; [`placement`] maps drawing mm to machine mm. This
+//! [`plan()`] expects a drawing in machine mm; [`place`] maps drawing mm to machine mm. This
 //! crate knows neither HPGL nor output formats nor files.
 //!
 //! # Example

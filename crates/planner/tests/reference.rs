@@ -42,7 +42,7 @@ const COARSE_EXCESS: f64 = 0.005;
 
 /// The path and the motors at one point, from one side.
 #[derive(Clone, Copy)]
-struct Place {
+struct PathPoint {
     ticks: MotorPos,
     first: MotorPos,
     second: MotorPos,
@@ -50,39 +50,39 @@ struct Place {
 }
 
 /// An interval of the reference's grid.
-struct Cell {
+struct Interval {
     length: f64,
     /// At its start, middle and end.
-    places: [Place; 3],
+    points: [PathPoint; 3],
     /// ∫|m'| ds over it, ticks.
     way: MotorPos,
 }
 
-fn place(machine: &Machine, piece: &Piece, s: f64, near: &mut JointPos) -> Place {
+fn point(machine: &Machine, piece: &Piece, s: f64, near: &mut JointPos) -> PathPoint {
     let t = (s * piece.rate).min(1.0);
     *near = machine.pose_near(piece.curve.eval(t), near).expect("it was lifted");
     let (velocity, acceleration) = piece.curve.derivatives(t);
     let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
     let (first, second) = machine.motor_derivatives(near, velocity, acceleration);
-    Place { ticks: machine.motor_positions(near), first, second, pen_speed: velocity.hypot2().sqrt() }
+    PathPoint { ticks: machine.motor_positions(near), first, second, pen_speed: velocity.hypot2().sqrt() }
 }
 
 /// Every interval of the path in `parts` parts, none longer than the path's length / (50 `parts`).
-fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
+fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Interval> {
     let PathGeometry::Drawn(start, section) = &path.geometry else { unreachable!("strokes are drawn") };
-    let longest = path.intervals.iter().map(|cell| cell.length).sum::<f64>() / (50 * parts) as f64;
+    let longest = path.intervals.iter().map(|interval| interval.length).sum::<f64>() / (50 * parts) as f64;
     let mut near = *start;
     let mut grid = Vec::new();
-    for cell in &path.intervals {
-        let piece = &section[cell.piece];
-        let count = parts.max((cell.length / longest).ceil() as usize);
-        let length = cell.length / count as f64;
+    for interval in &path.intervals {
+        let piece = &section[interval.piece];
+        let count = parts.max((interval.length / longest).ceil() as usize);
+        let length = interval.length / count as f64;
         for k in 0..count {
-            let from = cell.start + k as f64 * length;
-            let mut at = |share: f64| place(machine, piece, from + share * length, &mut near);
-            let places = [0.0, 0.5, 1.0].map(&mut at);
+            let from = interval.start + k as f64 * length;
+            let mut at = |share: f64| point(machine, piece, from + share * length, &mut near);
+            let points = [0.0, 0.5, 1.0].map(&mut at);
             let way = MotorPos([0, 1].map(|motor| {
-                let [start, _, end] = places;
+                let [start, _, end] = points;
                 if start.first[motor] * end.first[motor] >= 0.0 {
                     return (end.ticks[motor] - start.ticks[motor]).abs();
                 }
@@ -96,58 +96,58 @@ fn grid(machine: &Machine, path: &JointPath, parts: usize) -> Vec<Cell> {
                 let turn = at(low).ticks[motor];
                 (turn - start.ticks[motor]).abs() + (end.ticks[motor] - turn).abs()
             }));
-            grid.push(Cell { length, places, way });
+            grid.push(Interval { length, points, way });
         }
     }
     grid
 }
 
 /// The largest b under the motors' and the pen's speed limits.
-fn by_speed(machine: &Machine, place: &Place, pen: f64) -> f64 {
+fn by_speed(machine: &Machine, point: &PathPoint, pen: f64) -> f64 {
     let motors = machine.motors().iter().enumerate();
-    let speeds = motors.map(|(k, motor)| motor.max_speed_ticks_s / place.first[k].abs());
-    let speed = speeds.fold(pen / place.pen_speed, f64::min);
+    let speeds = motors.map(|(k, motor)| motor.max_speed_ticks_s / point.first[k].abs());
+    let speed = speeds.fold(pen / point.pen_speed, f64::min);
     speed * speed
 }
 
 /// The largest b for which some u satisfies `|m' u + m'' b| <= a` for both motors.
-fn by_acceleration(machine: &Machine, place: &Place) -> f64 {
+fn by_acceleration(machine: &Machine, point: &PathPoint) -> f64 {
     let [a, b] = machine.motors().each_ref().map(|motor| motor.max_acceleration_ticks_s2);
-    let (first, second) = (place.first, place.second);
+    let (first, second) = (point.first, point.second);
     (a * first[1].abs() + b * first[0].abs()) / (first[0] * second[1] - first[1] * second[0]).abs()
 }
 
 /// A lower bound on the duration of any motion along the path, s.
-fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
-    let at_most = |place: &Place| by_speed(machine, place, pen).min(by_acceleration(machine, place));
+fn lower_bound(machine: &Machine, grid: &[Interval], pen: f64) -> f64 {
+    let at_most = |point: &PathPoint| by_speed(machine, point, pen).min(by_acceleration(machine, point));
     let mut b = vec![0.0; grid.len() + 1];
     for k in 1..grid.len() {
-        b[k] = at_most(&grid[k - 1].places[2]).min(at_most(&grid[k].places[0]));
+        b[k] = at_most(&grid[k - 1].points[2]).min(at_most(&grid[k].points[0]));
     }
     let motors = machine.motors();
     // The bound on b at one end of an interval that follows from b at the other.
-    let reached = |cell: &Cell, from: &Place, to: &Place, b: f64| {
+    let reached = |interval: &Interval, from: &PathPoint, to: &PathPoint, b: f64| {
         let by = |k: usize| {
-            let squared_speed =
-                from.first[k] * from.first[k] * b + 2.0 * motors[k].max_acceleration_ticks_s2 * cell.way[k];
+            let squared_speed = from.first[k] * from.first[k] * b
+                + 2.0 * motors[k].max_acceleration_ticks_s2 * interval.way[k];
             squared_speed / (to.first[k] * to.first[k])
         };
         by(0).min(by(1))
     };
     for _ in 0..4 {
-        for (k, cell) in grid.iter().enumerate() {
-            b[k + 1] = b[k + 1].min(reached(cell, &cell.places[0], &cell.places[2], b[k]));
+        for (k, interval) in grid.iter().enumerate() {
+            b[k + 1] = b[k + 1].min(reached(interval, &interval.points[0], &interval.points[2], b[k]));
         }
-        for (k, cell) in grid.iter().enumerate().rev() {
-            b[k] = b[k].min(reached(cell, &cell.places[2], &cell.places[0], b[k + 1]));
+        for (k, interval) in grid.iter().enumerate().rev() {
+            b[k] = b[k].min(reached(interval, &interval.points[2], &interval.points[0], b[k + 1]));
         }
     }
-    let time = |(k, cell): (usize, &Cell)| {
+    let time = |(k, interval): (usize, &Interval)| {
         let by = |motor: usize| {
             let (v, a) = (motors[motor].max_speed_ticks_s, motors[motor].max_acceleration_ticks_s2);
-            let start = cell.places[0].first[motor].abs() * b[k].sqrt();
-            let end = cell.places[2].first[motor].abs() * b[k + 1].sqrt();
-            let way = cell.way[motor];
+            let start = interval.points[0].first[motor].abs() * b[k].sqrt();
+            let end = interval.points[2].first[motor].abs() * b[k + 1].sqrt();
+            let way = interval.way[motor];
             let peak = v.min((0.5 * (start * start + end * end) + a * way).sqrt()).max(start).max(end);
             let ramps = (2.0 * peak * peak - start * start - end * end) / (2.0 * a);
             let cruise = if peak > 0.0 { (way - ramps).max(0.0) / peak } else { 0.0 };
@@ -159,10 +159,11 @@ fn lower_bound(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
 }
 
 /// The shortest duration on the grid, s.
-fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
+fn convex_program(machine: &Machine, grid: &[Interval], pen: f64) -> f64 {
     let count = grid.len();
-    let fastest =
-        |cell: &Cell| by_speed(machine, &cell.places[0], pen).min(by_speed(machine, &cell.places[2], pen));
+    let fastest = |interval: &Interval| {
+        by_speed(machine, &interval.points[0], pen).min(by_speed(machine, &interval.points[2], pen))
+    };
     // All b relative to the largest possible b, which improves the conditioning.
     let unit = grid.iter().map(fastest).fold(0.0, f64::max);
     // Unknowns: b at the inner grid points, c <= √b there, and d >= 1 / (c + c of the next point)
@@ -172,12 +173,12 @@ fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     let mut rows = Rows::default();
     let b = |node: usize| (1..count).contains(&node).then(|| node - 1);
     let c = |node: usize| b(node).map(|index| c0 + index);
-    for (k, cell) in grid.iter().enumerate() {
+    for (k, interval) in grid.iter().enumerate() {
         for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
             for (motor, limits) in machine.motors().iter().enumerate() {
-                let place = &cell.places[j];
-                let rate = place.first[motor] / (2.0 * cell.length);
-                let turn = place.second[motor];
+                let point = &interval.points[j];
+                let rate = point.first[motor] / (2.0 * interval.length);
+                let turn = point.second[motor];
                 let scale = unit / limits.max_acceleration_ticks_s2;
                 let (from, to) = (scale * ((1.0 - share) * turn - rate), scale * (share * turn + rate));
                 for sign in [1.0, -1.0] {
@@ -186,7 +187,7 @@ fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
             }
         }
         if k > 0 {
-            let most = fastest(cell).min(by_speed(machine, &grid[k - 1].places[2], pen)) / unit;
+            let most = fastest(interval).min(by_speed(machine, &grid[k - 1].points[2], pen)) / unit;
             rows.push(&[(b(k), 1.0)], most);
             rows.push(&[(b(k), -1.0)], 0.0);
         }
@@ -207,9 +208,9 @@ fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     }
     let unknowns = d0 + count;
     let mut cost = vec![0.0; unknowns];
-    let total: f64 = grid.iter().map(|cell| cell.length).sum();
-    for (k, cell) in grid.iter().enumerate() {
-        cost[d0 + k] = cell.length / total;
+    let total: f64 = grid.iter().map(|interval| interval.length).sum();
+    for (k, interval) in grid.iter().enumerate() {
+        cost[d0 + k] = interval.length / total;
     }
     let mut cones: Vec<SupportedConeT<f64>> = vec![NonnegativeConeT(linear)];
     cones.extend(std::iter::repeat_n(SecondOrderConeT(3), inner + count));
@@ -223,7 +224,7 @@ fn convex_program(machine: &Machine, grid: &[Cell], pen: f64) -> f64 {
     assert!(matches!(status, SolverStatus::Solved | SolverStatus::AlmostSolved), "{status:?}");
     // Not the solver's objective, which contains its d, but the duration for its b.
     let speed = |node: usize| b(node).map_or(0.0, |index| (unit * solver.solution.x[index].max(0.0)).sqrt());
-    grid.iter().enumerate().map(|(k, cell)| 2.0 * cell.length / (speed(k) + speed(k + 1))).sum()
+    grid.iter().enumerate().map(|(k, interval)| 2.0 * interval.length / (speed(k) + speed(k + 1))).sum()
 }
 
 /// Rows of `A x + s = right`.
