@@ -224,7 +224,7 @@ codes! {
          below, may come out as other characters than were meant."
     CUT_AT_PAGE = 225 "H0225" Warning "cut at the page"
         "Ink outside the page that PS sets is not drawn, as on a plotter of HP-GL/2. The page begins at the origin. The \
-         first length of PS lies along x; or the longer one, where all ink fits then. If the ink should be drawn, the \
+         first length of PS lies along x; or the longer one, where more ink fits then. If the ink should be drawn, the \
          lengths of PS are too small."
     ASSUMED_PLOTTER = 226 "H0226" Note "scaling points assumed"
         "SC maps user units to the scaling points P1 and P2, and the file does not set them. Those of the plotter \

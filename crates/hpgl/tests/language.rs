@@ -97,8 +97,9 @@ fn page_size_order() {
     check(b"BP;IN;PS2000,4000;SP1;SC0,1,0,1;PU0,0;PD1,1;", &["1: 0,0 2000,4000"], &[]);
     // The longer one, where ink fits on such a page only.
     check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD4000,2000;", &["1: 0,0 4000,2000"], &[]);
-    // It fits on neither: cut as written.
-    check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD6000,0;", &["1: 0,0 2000,0"], &["H0225"]);
+    // It fits on neither: the page that keeps more of it.
+    check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD0,6000;", &["1: 0,0 0,4000"], &["H0225"]);
+    check(b"BP;IN;PS2000,4000;SP1;PU0,0;PD6000,0;", &["1: 0,0 4000,0"], &["H0225"]);
 }
 
 #[test]

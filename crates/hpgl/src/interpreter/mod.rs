@@ -53,17 +53,16 @@ pub fn interpret(syntax: &Syntax<'_>, options: &Options) -> Document {
     })
 }
 
-/// Reads a file with the lengths of `PS` as they are written. Where that cuts ink off, and a page whose
-/// longer side lies along x does not, that one is meant.
+/// Reads a file with the lengths of `PS` as they are written. Where that cuts ink off, and more ink is
+/// left on a page whose longer side lies along x, that page is meant.
 pub(crate) fn on_fitting_page(read: impl Fn(PageAxes) -> (Document, bool)) -> Document {
     let (document, is_cut) = read(PageAxes::AsWritten);
-    if is_cut {
-        let (turned, is_cut) = read(PageAxes::LongerAlongX);
-        if !is_cut {
-            return turned;
-        }
+    if !is_cut {
+        return document;
     }
-    document
+    let ink_mm = |document: &Document| document.pages.iter().map(|page| page.drawing.length()).sum::<f64>();
+    let (turned, _) = read(PageAxes::LongerAlongX);
+    if ink_mm(&turned) > ink_mm(&document) { turned } else { document }
 }
 
 /// Limit of hatch lines, and of dashes: this number plus [`SEGMENTS_PER_BYTE`] times the size of
