@@ -841,10 +841,55 @@ fn ordering_options() {
 fn plans_for_every_machine() {
     let dir = TestDir::new();
     for machine in PRESETS {
-        let said = dir.succeed(&format!("convert tiny.hpgl --machine {machine} --format csv --period 100ms"));
-        let plan = format!("{}\n{}", said.err, said.text());
+        let command = format!("convert tiny.hpgl --machine {machine} --period 100ms --report json");
+        let said = dir.succeed(&format!("{command} --format csv --output plan.csv"));
+        let report = said.err.lines().last().expect("a report on the last line");
+        let plan = format!("{}\n\n{}", plan_summary(report), dir.text("plan.csv"));
         insta::assert_snapshot!(format!("plan_{machine}"), plan);
+        dir.succeed("preview plan.csv --output plan.svg");
+        assert_picture(&format!("plan_{machine}.svg"), &dir.bytes("plan.svg"));
     }
-    let said = dir.succeed("convert tiny.hpgl --machine corexy --period 100ms");
-    insta::assert_snapshot!("plan_corexy_ticks", said.text());
+    let said = dir.succeed("convert tiny.hpgl --machine corexy --period 100ms --report json");
+    let report = said.err.lines().last().expect("a report on the last line");
+    insta::assert_snapshot!("plan_corexy_ticks", format!("{}\n\n{}", plan_summary(report), said.text()));
+}
+
+/// What a reviewer of a changed plan compares first: duration, rows, peaks and deviation, in a line.
+fn plan_summary(report: &str) -> String {
+    let report: serde_json::Value = serde_json::from_str(report).expect("one JSON object");
+    let (summary, certificate) = (&report["summary"], &report["certificate"]);
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    let motors = certificate["motors"].as_array().expect("two motors").iter();
+    let peaks = motors.map(|motor| {
+        let (speed, acceleration) = (number(&motor["speed_share"]), number(&motor["acceleration_share"]));
+        format!("{} {:.3} v, {:.3} a", motor["name"].as_str().expect("a name"), speed, acceleration)
+    });
+    let worst = |rounding: &str| {
+        let deviation = &certificate[rounding];
+        let max = |way: &str| number(&deviation[way]["max_mm"]);
+        max("ink_to_drawing").max(max("drawing_to_ink"))
+    };
+    format!(
+        "{:.3} s in {} rows; shares of the limits: {}; deviation {:.4} mm, in whole ticks {:.4} mm",
+        number(&summary["duration_s"]),
+        summary["rows"],
+        peaks.collect::<Vec<_>>().join("; "),
+        worst("before_rounding"),
+        worst("after_rounding")
+    )
+}
+
+/// Compares a picture with the one in tests/pictures, which a reviewer looks at. It is written anew
+/// where snapshots are (`INSTA_UPDATE=always`).
+fn assert_picture(name: &str, picture: &[u8]) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/pictures").join(name);
+    if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
+        fs::write(&file, picture).expect("the picture can be written");
+    }
+    let expected = fs::read(&file).unwrap_or_default();
+    assert!(
+        expected == picture,
+        "{} differs: look at it, then accept it with INSTA_UPDATE=always",
+        file.display()
+    );
 }

@@ -4,6 +4,35 @@
 //! [`pipeline`] takes a drawing to a certified plan, [`report`] describes the result. Nothing here
 //! knows a command line, a terminal, a port or a clock, so it also builds for
 //! `wasm32-unknown-unknown`. The binary `plotplan` is a thin layer on top.
+//!
+//! From a file to a certified plan:
+//!
+//! ```
+//! use compiler::machine_file::{MachineFile, PRESETS};
+//! use compiler::pipeline::{Order, Request, compile};
+//! use compiler::{import, report};
+//! use planner::{PlacementOptions, TimingLaw};
+//!
+//! let document = import::read(b"IN;SP1;PU400,400;PD1200,400,1200,1000;PU;", &import::Options::default())?;
+//! let machine = MachineFile::parse(PRESETS[1].toml)?.machine()?;
+//! let request = Request {
+//!     tolerance_mm: 0.1,
+//!     period_us: 10_000,
+//!     order: Order::Optimize(ordering::Options::default()),
+//!     placement: PlacementOptions::default(),
+//!     pen_speeds: Vec::new(),
+//!     lift_overlap_s: 0.0,
+//!     timing_law: TimingLaw::TimeOptimal,
+//!     allow_over_limit: false,
+//! };
+//! let compiled = compile(&document.pages[0].drawing, &machine, &request, &|_step| {})?;
+//! assert!(compiled.certificate.holds, "{}", report::text::certificate(&compiled.certificate));
+//! let mut bytes = Vec::new();
+//! let rows = compiled.trajectory.rows().map(|row| row.row);
+//! plan::file::tick_lines::write(&compiled.header, rows, &mut bytes)?;
+//! assert!(bytes.starts_with(b"; plotplan: 1\n; machine: corexy\n"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod import;
 pub mod machine_file;

@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Turn a drawing into a plan for a machine, or into a clean drawing
     Convert(Convert),
-    /// Say what a drawing's file says, and what would not plot
+    /// Report problems in a drawing file, and whether a machine can draw it
     Check(Check),
     /// Lengths, pens, bounds, duration of a drawing or a plan
     Info(Info),
@@ -59,7 +59,7 @@ pub(crate) struct Convert {
     /// Where to write; `-` for standard output
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: String,
-    /// What to write; `hpgl` and `svg` are the drawing as understood and need no machine
+    /// Output format; `hpgl` and `svg` write the normalized drawing and need no machine
     #[arg(short, long, value_enum, default_value = "ticks")]
     pub(crate) format: Format,
     /// With `--format hpgl`: write encoded polylines (PE) of HP-GL/2
@@ -113,7 +113,7 @@ pub(crate) struct Reading {
     /// Which page of the file to take, from 1
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) page: usize,
-    /// Plotter that the file was made for (see `plotplan explain plotters`); found out from the file if not given
+    /// Plotter that the file was made for (see `plotplan explain plotters`) [default: from the file]
     #[arg(long, value_name = "NAME")]
     pub(crate) plotter: Option<String>,
     /// The sheet on the machine: A4, A3,landscape, letter or WxH. With --plotter: the paper of that plotter
@@ -134,7 +134,7 @@ pub(crate) struct Reading {
     /// How to write diagnostics to standard error
     #[arg(long, value_enum, default_value_t = MessageFormat::Human)]
     pub(crate) message_format: MessageFormat,
-    /// Take warnings for errors
+    /// Treat warnings as errors
     #[arg(long)]
     pub(crate) strict: bool,
 }
@@ -189,37 +189,37 @@ pub(crate) struct Planning {
     /// Largest distance between drawing and pen, before rounding to ticks
     #[arg(long, value_name = "LENGTH", default_value = "0.1mm", value_parser = length)]
     pub(crate) tolerance: f64,
-    /// Time between rows; the machine's own if not given
+    /// Time between rows [default: the machine's]
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub(crate) period: Option<f64>,
-    /// In which order to draw the strokes
+    /// Order of the strokes
     #[arg(long, value_enum, default_value_t = Order::Optimize)]
     pub(crate) order: Order,
-    /// How hard to look for an order, from 0 to 3
+    /// Ordering effort, from 0 to 3
     #[arg(long, value_name = "LEVEL", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
     pub(crate) effort: u8,
-    /// Do not draw what is drawn twice
+    /// Remove duplicate strokes
     #[arg(long)]
     pub(crate) dedupe: bool,
-    /// Draw no stroke from its other end
+    /// Never reverse strokes
     #[arg(long)]
     pub(crate) keep_direction: bool,
     /// Order of the pens; those not named come after, in the file's order
     #[arg(long, value_name = "PEN,PEN,...", value_delimiter = ',')]
     pub(crate) pen_order: Option<Vec<u16>>,
-    /// Whose speed the pen draws at
+    /// Source of the drawing speed
     #[arg(long, value_enum, default_value_t = Speed::Machine)]
     pub(crate) speed: Speed,
-    /// Begin to travel when the pen is half way up, not only when it is all the way up
+    /// Start to travel when the pen is half way up, instead of fully up
     #[arg(long)]
     pub(crate) overlap_lifts: bool,
-    /// How the pen speeds up and slows down over the paper
+    /// Timing law of the strokes
     #[arg(long, value_enum, default_value_t = Law::TimeOptimal)]
     pub(crate) law: Law,
-    /// With the laws linear, sine and quadratic: time from one vertex to the next
+    /// With --law linear, sine or quadratic: duration of each segment
     #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = time)]
     pub(crate) segment_time: f64,
-    /// Write the plan even if it breaks the motors' limits, as laws with a given time may; the report says where
+    /// Write the plan even if it exceeds the motors' limits, as laws of fixed duration may
     #[arg(long)]
     pub(crate) allow_over_limit: bool,
     #[command(flatten)]
@@ -569,7 +569,7 @@ pub(crate) enum Law {
     Quadratic,
 }
 
-/// Whose speed the pen draws at.
+/// Source of the drawing speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Speed {
     /// The machine's

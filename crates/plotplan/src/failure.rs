@@ -1,4 +1,4 @@
-//! How a command fails: what is said and with which exit code.
+//! Failures of a command, with their exit codes.
 
 use std::process::ExitCode;
 
@@ -7,7 +7,7 @@ use crate::terminal;
 /// Why a command stops.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The drawing cannot be planned, or a certificate does not hold: exit 1. All has been said already.
+    /// The drawing cannot be planned, or a certificate does not hold: exit 1. Already reported.
     Refused,
     /// The drawing cannot be planned: exit 1.
     Drawing(anyhow::Error),
@@ -15,14 +15,14 @@ pub(crate) enum Failure {
     Usage(anyhow::Error),
     /// Reading or writing failed: exit 3.
     Io(anyhow::Error),
-    /// Stopped by whoever is in charge: exit 130, as shells have it. All has been said already.
+    /// Interrupted by the user: exit 130, by shell convention. Already reported.
     Interrupted,
-    /// Whoever read our output has seen enough: quiet, exit 0.
+    /// Standard output was closed (EPIPE): quiet, exit 0.
     ClosedPipe,
 }
 
 impl Failure {
-    /// Says what is left to say and gives the exit code.
+    /// Reports the failure and returns the exit code.
     pub(crate) fn report(self) -> ExitCode {
         let (code, error) = match self {
             Self::ClosedPipe => return ExitCode::SUCCESS,

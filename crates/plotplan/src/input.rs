@@ -51,13 +51,13 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
     }
     let bytes =
         read_file(Path::new(file)).with_context(|| format!("cannot read {file}")).map_err(Failure::Io)?;
-    // Only the file's own name: a plan must not depend on where the drawing lies.
+    // The base name only: a plan must not depend on the folder of the drawing.
     let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy().into_owned());
     Ok(Input { name, bytes })
 }
 
 /// Why `--strict` refuses.
-pub(crate) const STRICT: &str = "there are warnings, and --strict takes them for errors";
+pub(crate) const STRICT: &str = "stopping because of warnings (--strict)";
 
 /// A drawing's file, read, and the page that was asked for.
 pub(crate) struct LoadedDrawing {

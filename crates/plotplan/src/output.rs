@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::failure::Failure;
 
-/// Calls `write` with where the output goes: standard output for `-`, otherwise a temporary file beside `to` that takes
-/// its name only when all of it has been written.
+/// Writes to standard output for `-`, otherwise to a temporary file beside `to` that is renamed
+/// once it is complete. Refuses to replace an input.
 pub(crate) fn write(
     to: &str,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -35,11 +35,11 @@ pub(crate) fn write(
     temporary.prefix(".plotplan-");
     #[cfg(unix)]
     {
-        // As any new file, not for the owner alone: the process's own mask still applies.
+        // Permissions of a new file: the umask of the process applies.
         use std::os::unix::fs::PermissionsExt as _;
         temporary.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    // Only the kind of error: its text names the temporary file, which means nothing to anybody and is never the same.
+    // Only the kind of error: its text would name the temporary file.
     let file = temporary.tempfile_in(folder).map_err(|error| failed(error.kind().into()))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     write(&mut out).and_then(|()| out.flush()).map_err(failed)?;

@@ -1,4 +1,4 @@
-//! A pseudo-terminal: one end for us, and a path for whoever takes it for a serial port.
+//! A pseudo-terminal: this end, and the path of the other end, which a sender opens as a serial port.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -37,7 +37,7 @@ impl PseudoTerminal {
         &self.path
     }
 
-    /// At most so many bytes that have come in, waiting for the first of them no longer than this.
+    /// Reads at most `most` bytes; waits for the first one up to `within`.
     pub(crate) fn read(&self, most: usize, within: Duration) -> io::Result<Vec<u8>> {
         if most == 0 {
             std::thread::sleep(within.min(Duration::from_millis(1)));

@@ -1,4 +1,4 @@
-//! What people see on standard error: diagnostics with a window of the file, progress, reports.
+//! Standard error: diagnostics with an excerpt of the file, progress, reports.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
@@ -12,10 +12,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::cli::MessageFormat;
 use crate::input::Input;
 
-/// Bytes shown to either side of a place: files of one line of many megabytes are normal.
+/// Bytes shown on either side of a place: files of a single line of 10 MB are common.
 const WINDOW: usize = 48;
 
-/// Prints text to standard error, in colour only where that is wanted. A standard error that is closed is no reason to stop.
+/// Prints text to standard error, in colour where the terminal supports it. Ignores a closed
+/// standard error.
 pub(crate) fn say(text: &str) {
     let mut out = anstream::AutoStream::auto(std::io::stderr());
     let _ = out.write_all(text.as_bytes());
@@ -34,7 +35,7 @@ pub(crate) fn warning(message: &str) {
 
 fn render(report: &[Group<'_>]) {
     let text = Renderer::styled().render(report);
-    // A window of a line has its place from an origin, and is then marked as another file's that has no name.
+    // The renderer marks an excerpt with an origin as a second, unnamed file: that line is removed.
     let is_mark = |line: &&str| anstream::adapter::strip_str(line).to_string().trim() == ":::";
     let lines: Vec<&str> = text.lines().filter(|line| !is_mark(line)).collect();
     say(&format!("{}\n", lines.join("\n")));
@@ -88,7 +89,7 @@ pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: Mes
     }
 }
 
-/// A diagnostic in a line that can be searched for.
+/// A diagnostic on one line, for grep.
 fn short(input: &Input, diagnostic: &Diagnostic) -> String {
     let Diagnostic { code, severity, span, message, count, .. } = diagnostic;
     let times = if *count > 1 { format!(" ({count} times)") } else { String::new() };
@@ -99,7 +100,7 @@ fn short(input: &Input, diagnostic: &Diagnostic) -> String {
     format!("{}:{place}: {severity}[{code}]: {message}{times}", input.name)
 }
 
-/// A diagnostic for programs.
+/// A diagnostic as JSON.
 fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
     let mut object = serde_json::json!({
         "file": input.name,
@@ -120,7 +121,7 @@ fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
     object
 }
 
-/// Prints a message with the window of the file that it is about.
+/// Prints a message with the excerpt of the file that it is about.
 pub(crate) fn at_place(
     input: &Input,
     span: Span,
@@ -150,7 +151,7 @@ pub(crate) fn at_place(
     render(&[group]);
 }
 
-/// A printable piece of a line around a place.
+/// A printable excerpt of a line around a place.
 struct Window {
     text: String,
     /// What to mark, in bytes of `text`.
@@ -199,7 +200,7 @@ impl Window {
     }
 }
 
-/// Shows what is being done, on a terminal only and not for the first half second.
+/// Progress of planning; on a terminal only, and not during the first half second.
 pub(crate) struct Progress {
     bar: ProgressBar,
 }
@@ -235,7 +236,7 @@ impl Progress {
     }
 }
 
-/// Shows how far a machine has come, and how long it will take, on a terminal only.
+/// Progress of sending with the time left; on a terminal only.
 pub(crate) struct SendingProgress {
     bar: ProgressBar,
 }

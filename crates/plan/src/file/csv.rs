@@ -27,11 +27,11 @@ use super::header::{Notes, RowCheck, assemble};
 use super::text::{Line, Text, lines, parse_signed, parse_unsigned, shown};
 use super::{ReadError, RowsError, WriteError, check_header};
 
-/// Writes a plan whose rows are those that `header` promises.
+/// Writes a plan. The rows must agree with `header`.
 ///
 /// # Errors
-/// A header that [`check_header`] refuses, before anything is written; rows that are not as promised, at the first
-/// that is not; whatever the writer says.
+/// A header that [`check_header`] refuses, before anything is written; rows that disagree with the
+/// header; errors of the writer.
 pub fn write<W: Write + ?Sized>(
     header: &Header,
     rows: impl IntoIterator<Item = Row>,
@@ -76,7 +76,7 @@ pub fn write<W: Write + ?Sized>(
 /// Reads a plan.
 ///
 /// # Errors
-/// Anything but a whole plan, with the number of the line.
+/// Anything but a complete plan, with the line number.
 pub fn read(bytes: &[u8]) -> Result<TickTable, ReadError> {
     let mut lines = lines(bytes);
     let mut notes = Notes::default();

@@ -1,4 +1,4 @@
-//! What can go wrong on the way out and on the way in.
+//! Errors of reading and writing plan files.
 
 use std::io;
 

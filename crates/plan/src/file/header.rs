@@ -1,4 +1,4 @@
-//! What all plan formats share: which headers and rows make a plan, and `key: value` lines.
+//! Shared by all plan formats: validity of headers and rows, and `key: value` lines.
 
 use crate::{Header, Limits, MOTORS, Motor, Row};
 
@@ -9,8 +9,8 @@ use super::{HeaderError, ReadError, RowsError};
 ///
 /// A machine's name is 1 to 48 ASCII letters, digits, spaces or any of `_ . + - /`, with no space at either end. A
 /// motor's name heads a column: an ASCII letter, then up to 19 letters, digits or any of `_ . -`; no two columns
-/// share a name, and `t_us` and `pen` are taken. All coefficients and limits are finite. The rules keep away every
-/// character that a serial sender may act on, and every line of a plan short; machine files are best held to them.
+/// share a name, and `t_us` and `pen` are taken. All coefficients and limits are finite. The rules
+/// exclude every character that a serial sender may act on, and keep lines short.
 pub fn check_header(header: &Header) -> Result<(), HeaderError> {
     if !is_machine_name(&header.machine) {
         return Err(HeaderError::MachineName(header.machine.clone()));
@@ -48,7 +48,7 @@ fn is_motor_name(name: &str) -> bool {
         && name.starts_with(|first: char| first.is_ascii_alphabetic())
 }
 
-/// Counts rows and sees that time begins at 0 and only goes on.
+/// Counts rows and checks that time starts at 0 and increases.
 #[derive(Default)]
 pub(crate) struct RowCheck {
     count: u64,
@@ -64,7 +64,7 @@ impl RowCheck {
         self.t_us
     }
 
-    /// Takes note of the next row's time.
+    /// Checks the next row's time.
     pub(crate) fn accept(&mut self, t_us: u64) -> Result<(), RowsError> {
         if self.count == 0 {
             if t_us != 0 {
@@ -78,7 +78,7 @@ impl RowCheck {
         Ok(())
     }
 
-    /// Takes note of the next row of a plan that is being written under `header`.
+    /// Checks the next row of a plan that is written under `header`.
     pub(crate) fn accept_under(&mut self, header: &Header, row: &Row) -> Result<(), RowsError> {
         if self.count == header.rows {
             return Err(RowsError::Count { stated: header.rows, found: self.count + 1 });
@@ -86,7 +86,7 @@ impl RowCheck {
         self.accept(row.t_us)
     }
 
-    /// Whether the rows so far are what a header promised.
+    /// Whether the rows agree with the header.
     pub(crate) fn finish(&self, stated_rows: u64, stated_us: u64) -> Result<(), RowsError> {
         if self.count == 0 {
             return Err(RowsError::None);
@@ -108,7 +108,7 @@ pub(crate) struct Notes<'a> {
 }
 
 impl<'a> Notes<'a> {
-    /// Keeps a comment, without its sign, if it is a `key: value`; other comments are anybody's own.
+    /// Stores a comment of the form `key: value`; ignores others.
     pub(crate) fn add(&mut self, number: u64, comment: &'a [u8]) {
         if let Ok(comment) = std::str::from_utf8(comment)
             && let Some((key, value)) = comment.split_once(':')
@@ -121,7 +121,7 @@ impl<'a> Notes<'a> {
         self.notes.iter().find(|note| note.1 == key).map(|note| (note.0, note.2))
     }
 
-    /// The value of `key` with its line number. `at` is the line before which it has to stand.
+    /// The value of `key` with its line number; `at` is the line that it must precede.
     pub(crate) fn text(&self, key: &str, at: Line) -> Result<(u64, &'a str), ReadError> {
         self.find(key).ok_or_else(|| ReadError::Unexpected {
             line: at.number,
@@ -138,7 +138,7 @@ impl<'a> Notes<'a> {
         }
     }
 
-    /// A whole number that may be left out.
+    /// An optional integer.
     pub(crate) fn count(&self, key: &str) -> Result<Option<u64>, ReadError> {
         let Some((line, value)) = self.find(key) else { return Ok(None) };
         match super::text::parse_unsigned(value.as_bytes()) {
@@ -189,13 +189,13 @@ impl<'a> Notes<'a> {
         self.numbers(key, 1, 1, at).map(|numbers| numbers[0])
     }
 
-    /// The same where it may be left out.
+    /// One optional finite number.
     pub(crate) fn number_if_given(&self, key: &str, at: Line) -> Result<Option<f64>, ReadError> {
         if self.find(key).is_some() { self.number(key, at).map(Some) } else { Ok(None) }
     }
 }
 
-/// A header from its parts, once the rows are known; a period that is not stated is the shortest time between rows.
+/// A header from its parts and the rows. A missing period is the shortest time between rows.
 pub(crate) fn assemble(
     machine: &str,
     motors: [Motor; MOTORS],

@@ -1,4 +1,4 @@
-//! Plan documents: one JSON object that holds all there is to know about a plan.
+//! Plan documents: one JSON object with the plan and all that it was made from.
 //!
 //! ```text
 //! {
@@ -12,8 +12,8 @@
 //! }
 //! ```
 //!
-//! `machine`, `settings`, `summary` and `certificate` are the caller's own values; to this module they are opaque.
-//! Keys in other places that are not known here are passed over.
+//! `machine`, `settings`, `summary` and `certificate` are opaque to this module.
+//! Unknown keys elsewhere are ignored.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -26,13 +26,13 @@ use super::header::RowCheck;
 use super::text::Text;
 use super::{ReadError, WriteError, check_header};
 
-/// What a plan document says in `format`.
+/// Value of the key `format`.
 pub(crate) const FORMAT: &str = "plotplan-plan";
 const VERSION: u64 = 1;
-/// A line of a column holds this many numbers.
+/// Numbers on one line of a column.
 const NUMBERS_A_LINE: u64 = 20;
 
-/// What a plan was made from.
+/// The source of a plan.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
     /// Name of the drawing's file, as given.
@@ -41,10 +41,10 @@ pub struct Source {
     pub sha256: String,
 }
 
-/// What a plan document holds beside the plan.
+/// A plan document without its plan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Document {
-    /// What the plan was made from.
+    /// The drawing that the plan was made from.
     pub source: Source,
     /// The resolved machine.
     pub machine: Value,
@@ -52,7 +52,7 @@ pub struct Document {
     pub settings: Value,
     /// Durations, lengths and the like.
     pub summary: Value,
-    /// What the verifier said.
+    /// The certificate.
     pub certificate: Value,
 }
 

@@ -1,4 +1,4 @@
-//! Which format a file is in, by its first bytes.
+//! Recognition of the format by the first bytes.
 
 use crate::TickTable;
 
@@ -24,14 +24,14 @@ pub struct PlanFile {
     pub format: PlanFormat,
     /// The plan.
     pub table: TickTable,
-    /// What a plan document says beside it; nothing in the other formats.
+    /// The rest of a plan document; `None` for the other formats.
     pub document: Option<Document>,
 }
 
-/// Reads a plan in whichever format it is.
+/// Reads a plan of any format.
 ///
 /// # Errors
-/// [`ReadError::NotAPlan`] where the first bytes are those of no plan; otherwise what the format's own reader says.
+/// [`ReadError::NotAPlan`] if no format is recognized; otherwise those of the format's reader.
 pub fn read(bytes: &[u8]) -> Result<PlanFile, ReadError> {
     let format = format_of(bytes).ok_or(ReadError::NotAPlan)?;
     let (table, document) = match format {
@@ -42,12 +42,12 @@ pub fn read(bytes: &[u8]) -> Result<PlanFile, ReadError> {
     Ok(PlanFile { format, table, document })
 }
 
-/// Whether the first bytes are those of a plan, whole or not, rather than of a drawing.
+/// Whether the first bytes are those of a plan, complete or not.
 pub fn is_plan(bytes: &[u8]) -> bool {
     format_of(bytes).is_some()
 }
 
-/// How far into a file its format has to show.
+/// The format must show within this many bytes.
 const HEAD_BYTES: usize = 4096;
 
 fn format_of(bytes: &[u8]) -> Option<PlanFormat> {

@@ -1,18 +1,18 @@
-//! Tick lines, the default format: for any serial sender, and any firmware that can be written in an afternoon.
+//! Tick lines, the default format, for any serial sender and for simple firmware.
 //!
 //! `docs/tick-lines.md` is the specification. In short, a machine knows four commands, each a line of ASCII with
 //! absolute whole numbers in it:
 //!
 //! ```text
-//! begin 1 MOVES DURATION      a plan of this version, with so many `m` lines, taking so many microseconds
-//! s ROW TIME T1 T2            sync: here, at rest, with the pen up, so many rows and microseconds into the plan
-//! m PEN DURATION T1 T2        set the pen, then move both motors linearly to T1 and T2 within DURATION microseconds
-//! end PEN MOVES DURATION      set the pen; the plan is over, and this is what there was of it
+//! begin 1 MOVES DURATION      version 1; number of `m` lines; duration, us
+//! s ROW TIME T1 T2            sync: position at this row and time, at rest, pen up
+//! m PEN DURATION T1 T2        set the pen, then move both motors linearly to T1 and T2 in DURATION us
+//! end PEN MOVES DURATION      set the pen; end of the plan, with its totals
 //! ```
 //!
 //! A plan's rows are instants and an `m` line is the way from one row to the next, so its pen is that of the row
 //! before. The first row is in the first `s` line, the last row's pen in the `end` line: nothing is lost. Everything
-//! else that a [`Header`] holds is in comments before `begin`, for programs; a firmware passes them over.
+//! else that a [`Header`] holds is in comments before `begin`, for programs; a firmware skips them.
 
 use std::io::Write;
 
@@ -28,12 +28,11 @@ pub const LINE_BYTES: usize = 70;
 /// Between two progress marks passes at least this much plan time.
 const MARK_EVERY_US: u64 = 1_000_000;
 
-/// Writes a plan whose rows are those that `header` promises.
+/// Writes a plan. The rows must agree with `header`.
 ///
 /// # Errors
-/// A header that [`check_header`] refuses, before anything is written; rows that are not as promised, at the first
-/// that is not; a line longer than [`LINE_BYTES`], which needs ticks of 19 digits late in a plan of a million years;
-/// whatever the writer says.
+/// A header that [`check_header`] refuses, before anything is written; rows that disagree with the
+/// header; errors of the writer; a line longer than [`LINE_BYTES`], which needs ticks of 19 digits late in a plan of a million years.
 pub fn write<W: Write + ?Sized>(
     header: &Header,
     rows: impl IntoIterator<Item = Row>,
@@ -107,7 +106,7 @@ fn write_sync<W: Write + ?Sized>(text: &mut Text<'_, W>, index: u64, row: Row) -
     if bytes > LINE_BYTES { Err(WriteError::LineTooLong { row: index, bytes }) } else { Ok(()) }
 }
 
-/// How far the plan has come, for people who watch a sender: `; @ 12.3s 3.2%`, rounded down.
+/// Progress of the plan for people who watch a sender: `; @ 12.3s 3.2%`, rounded down.
 fn write_mark<W: Write + ?Sized>(text: &mut Text<'_, W>, t_us: u64, duration_us: u64) {
     let tenths = t_us / 100_000;
     let permille = (u128::from(t_us) * 1000 / u128::from(duration_us.max(1))) as u64;
@@ -118,7 +117,7 @@ fn write_mark<W: Write + ?Sized>(text: &mut Text<'_, W>, t_us: u64, duration_us:
 /// Reads a plan.
 ///
 /// # Errors
-/// Anything but a whole plan in which every sync line agrees with what stands before it, with the number of the line.
+/// Anything but a complete plan whose sync lines agree with the rows, with the line number.
 pub fn read(bytes: &[u8]) -> Result<TickTable, ReadError> {
     let mut notes = Notes::default();
     let mut begun: Option<(Line, [u64; 2])> = None;
