@@ -8,6 +8,7 @@ mod failure;
 mod input;
 mod keys;
 mod machines;
+mod options;
 mod output;
 mod port;
 #[cfg(unix)]
@@ -19,6 +20,9 @@ fn main() -> ExitCode {
     use clap::{CommandFactory as _, FromArgMatches as _};
     let matches = cli::Arguments::command().get_matches();
     let arguments = cli::Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    if let Some(what) = options::without_effect(&matches) {
+        return failure::Failure::Usage(anyhow::anyhow!(what)).report();
+    }
     match command::run(&arguments, &cli::plan_options(&matches)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
