@@ -878,6 +878,7 @@ fn plan_summary(report: &str) -> String {
 
 /// Compares a picture with the one in tests/pictures, which a reviewer looks at. It is written anew
 /// where snapshots are (`INSTA_UPDATE=always`).
+#[expect(clippy::disallowed_methods, reason = "insta reads the same variable")]
 fn assert_picture(name: &str, picture: &[u8]) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/pictures").join(name);
     if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {

@@ -2,7 +2,7 @@
 //!
 //! This is what the planner hands over, the verifier replays and the formats write. It knows neither machines nor
 //! drawings nor files. Every machine of plotplan moves a pen in a plane with as many motors as the plane has
-//! dimensions, so a row holds two motor positions. [`file`] reads and writes plans.
+//! dimensions, so a row holds two motor positions. [`mod@file`] reads and writes plans.
 //!
 //! ```
 //! use plan::{Header, Limits, Motor, Row, file};

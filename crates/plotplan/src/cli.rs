@@ -116,7 +116,7 @@ pub(crate) struct Reading {
     /// Plotter that the file was made for (see `plotplan explain plotters`) [default: from the file]
     #[arg(long, value_name = "NAME")]
     pub(crate) plotter: Option<String>,
-    /// The sheet on the machine: A4, A3,landscape, letter or WxH. With --plotter: the paper of that plotter
+    /// The sheet on the machine: A4, A3,landscape, letter or 200x300mm. With --plotter: the paper of that plotter
     #[arg(long, value_name = "PAPER")]
     pub(crate) paper: Option<String>,
     /// SVG: how pens are numbered

@@ -118,6 +118,8 @@ fn drawing(command: &str, options: &Given<'_>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write as _;
+
     use clap::CommandFactory as _;
 
     use super::*;
@@ -168,9 +170,9 @@ mod tests {
     fn every_option_of_every_command_and_format() {
         let mut table = String::new();
         let mut row = |words: &[&str]| {
-            table.push_str(&format!("{}\n", words[1..].join(" ")));
+            let _ = writeln!(table, "{}", words[1..].join(" "));
             for (option, value) in VALUES {
-                table.push_str(&format!("  {option:<18} {}\n", verdict(words, option, value)));
+                let _ = writeln!(table, "  {option:<18} {}", verdict(words, option, value));
             }
         };
         let formats = ["ticks", "csv", "json", "hpgl", "svg"];

@@ -42,7 +42,9 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
     let certificate = replay::certify(&plan, &machine.machine, drawing.as_ref(), tolerance);
     if arguments.report == ReportForm::Text {
-        mismatches.iter().for_each(|mismatch| terminal::warning(mismatch));
+        for mismatch in &mismatches {
+            terminal::warning(mismatch);
+        }
     }
     let text = match (arguments.report, drawing.is_some()) {
         (ReportForm::Text, true) => text::certificate(&certificate),
