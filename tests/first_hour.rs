@@ -65,11 +65,9 @@ fn output_never_replaces_an_input() {
     dir.write("a.hpgl", SQUARE);
     let machine = succeed(&dir, "machine show cartesian");
     dir.write("m.toml", &machine);
-    for command in [
-        "convert a.hpgl -m m.toml -o a.hpgl",
-        "convert a.hpgl -m m.toml -o m.toml",
-        "preview a.hpgl -o link.svg",
-    ] {
+    for command in
+        ["convert a.hpgl -o a.hpgl", "convert a.hpgl -m m.toml -o m.toml", "preview a.hpgl -o link.svg"]
+    {
         #[cfg(unix)]
         if command.contains("link") {
             std::os::unix::fs::symlink("a.hpgl", dir.path().join("link.svg")).expect("a link");
@@ -190,4 +188,25 @@ fn options_without_effect_are_refused() {
         let said = fail(&dir, command, 2);
         assert!(said.contains("has no effect"), "plotplan {command}\n{said}");
     }
+}
+
+#[test]
+fn format_follows_the_extension_of_the_output() {
+    let dir = TestDir::new();
+    dir.write("a.hpgl", SQUARE);
+    for (name, begins) in
+        [("p.csv", "# plotplan: 1"), ("p.json", "{"), ("p.ticks", "; plotplan: 1"), ("p", "; plotplan: 1")]
+    {
+        succeed(&dir, &format!("convert a.hpgl -m corexy -o {name}"));
+        assert!(dir.text(name).starts_with(begins), "{name}");
+    }
+    for (name, begins) in [("p.svg", "<svg"), ("p.plt", "IN;")] {
+        succeed(&dir, &format!("convert a.hpgl -o {name}"));
+        assert!(dir.text(name).contains(begins), "{name}");
+    }
+    for command in ["convert a.hpgl -m corexy -f csv -o x.json", "convert a.hpgl -f svg -o x.csv"] {
+        let said = fail(&dir, command, 2);
+        assert!(said.contains("contradicts the extension"), "{said}");
+    }
+    assert!(!dir.path().join("x.json").exists());
 }

@@ -1,5 +1,6 @@
 //! The arguments of the command line.
 
+use std::path::Path;
 use std::sync::LazyLock;
 
 use backends::{Backend, EncodeOptions, PenActuator};
@@ -59,9 +60,10 @@ pub(crate) struct Convert {
     /// Where to write; `-` for standard output
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: String,
-    /// Output format; `hpgl` and `svg` write the normalized drawing and need no machine
-    #[arg(short, long, value_enum, default_value = "ticks")]
-    pub(crate) format: Format,
+    /// Output format; `hpgl` and `svg` write the normalized drawing and need no machine [default: by the extension of
+    /// --output, else ticks]
+    #[arg(short, long, value_enum)]
+    pub(crate) format: Option<Format>,
     /// With `--format hpgl`: write encoded polylines (PE) of HP-GL/2
     #[arg(long)]
     pub(crate) hpgl2: bool,
@@ -74,6 +76,20 @@ pub(crate) struct Convert {
     /// How to report on standard error
     #[arg(long, value_enum, default_value_t = ReportForm::Text)]
     pub(crate) report: ReportForm,
+}
+
+impl Convert {
+    /// The format asked for, by name or by the extension of the output.
+    pub(crate) fn format(&self) -> Result<Format, String> {
+        let of_extension = || Format::of_extension(&self.output);
+        match (self.format, of_extension()) {
+            (None, by_extension) => Ok(by_extension.unwrap_or_default()),
+            (Some(format), Some(by_extension)) if format.contradicts(by_extension) => {
+                Err(format!("--format {} contradicts the extension of {}", format.name(), self.output))
+            }
+            (Some(format), _) => Ok(format),
+        }
+    }
 }
 
 /// How firmware formats move the pen.
@@ -517,6 +533,41 @@ impl Format {
             Self::Hpgl => ("hpgl", "The drawing as understood, as clean HP-GL"),
             Self::Svg => ("svg", "The drawing as understood, as SVG in mm"),
         })
+    }
+}
+
+impl Default for Format {
+    /// Tick lines.
+    fn default() -> Self {
+        Self::value_variants()[0]
+    }
+}
+
+impl Format {
+    pub(crate) fn name(self) -> &'static str {
+        self.name_and_help().map_or("", |(name, _)| name)
+    }
+
+    /// The format that files with the extension of this name hold; `None` for names without one, and
+    /// for extensions that leave the format open.
+    pub(crate) fn of_extension(output: &str) -> Option<Self> {
+        let extension = Path::new(output).extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "ticks" => Some(Self::default()),
+            "csv" => Some(Self::Csv),
+            "json" => Some(Self::Json),
+            "hpgl" | "plt" => Some(Self::Hpgl),
+            "svg" => Some(Self::Svg),
+            _ => None,
+        }
+    }
+
+    /// Whether a file of that extension cannot hold this format. Some firmwares' formats are CSV or
+    /// JSON, too.
+    fn contradicts(self, by_extension: Self) -> bool {
+        let is_firmwares = matches!(self, Self::Backend(_)) && self.name() != "ticks";
+        let is_table = matches!(by_extension, Self::Csv | Self::Json);
+        self.name() != by_extension.name() && !(is_firmwares && is_table)
     }
 }
 

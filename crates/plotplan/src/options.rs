@@ -3,6 +3,8 @@
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 
+use crate::cli::Format;
+
 /// Options of planning proper.
 const PLANNING: [&str; 12] = [
     "tolerance",
@@ -69,7 +71,12 @@ impl Given<'_> {
 }
 
 fn convert(options: &Given<'_>) -> Option<String> {
-    let format = options.text("format");
+    let format = match options.text("format") {
+        given if given.is_empty() => {
+            Format::of_extension(&options.text("output")).unwrap_or_default().name().to_owned()
+        }
+        given => given,
+    };
     if format == "hpgl" || format == "svg" {
         let why = format!("with --format {format}: it writes the drawing as it is");
         let hpgl2 = options.refuse(&["hpgl2"], &why).filter(|_| format == "svg");

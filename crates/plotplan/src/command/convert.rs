@@ -20,7 +20,8 @@ use crate::terminal::{self, Progress};
 
 pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Failure> {
     // What is wrong with the machine shows before a long read.
-    let machine = match (arguments.format, &arguments.machine) {
+    let format = arguments.format().map_err(|what| Failure::Usage(anyhow::anyhow!(what)))?;
+    let machine = match (format, &arguments.machine) {
         (Format::Hpgl | Format::Svg, _) => None,
         (_, Some(name)) => Some(machines::machine_with_paper(name, &arguments.reading)?),
         (_, None) => {
@@ -38,16 +39,16 @@ pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Fa
         ));
     }
     match machine {
-        Some(machine) => plan(arguments, command_line, &input, &drawn, &machine),
-        None => write_drawing(arguments, drawn.drawing()),
+        Some(machine) => plan(arguments, format, command_line, &input, &drawn, &machine),
+        None => write_drawing(arguments, format, drawn.drawing()),
     }
 }
 
-fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> {
+fn write_drawing(arguments: &Convert, format: Format, drawing: &Drawing) -> Result<(), Failure> {
     let encoding =
         if arguments.hpgl2 { hpgl::Encoding::Base64 } else { hpgl::EmitOptions::default().encoding };
     let options = hpgl::EmitOptions { encoding, ..hpgl::EmitOptions::default() };
-    output::write(&arguments.output, |out| match arguments.format {
+    output::write(&arguments.output, |out| match format {
         Format::Svg => picture::svg::write(drawing, out),
         _ => out.write_all(&hpgl::emit(drawing, &options)),
     })
@@ -55,6 +56,7 @@ fn write_drawing(arguments: &Convert, drawing: &Drawing) -> Result<(), Failure> 
 
 fn plan(
     arguments: &Convert,
+    format: Format,
     command_line: &[String],
     input: &Input,
     drawn: &LoadedDrawing,
@@ -94,7 +96,7 @@ fn plan(
     if !compiled.certificate.holds {
         terminal::warning("the plan breaks the motors' limits, which was allowed");
     }
-    if let Format::Backend(backend) = arguments.format {
+    if let Format::Backend(backend) = format {
         write_encoded(arguments, backend, &machine.machine, &compiled)?;
         terminal::say(&said);
         return Ok(());
@@ -103,7 +105,7 @@ fn plan(
     let settings = Settings::of(&request, reading.page, &reading.options(), command_line.to_vec());
     let rows = || compiled.trajectory.rows().map(|row| row.row);
     output::write(&arguments.output, |out| {
-        let written = match arguments.format {
+        let written = match format {
             Format::Csv => plan::file::csv::write(&compiled.header, rows(), out),
             Format::Json => {
                 let document = plan::file::json::Document {

@@ -1,5 +1,5 @@
 //! Rows a second through the verifier:
-//! `cargo run --release -p plotplan-verify --example throughput [-- PART-OF-A-NAME]`.
+//! `cargo run --release -p plotplan-verify --example replay_throughput [-- PART-OF-A-NAME]`.
 //!
 //! The plans follow the drawing at a constant speed and ignore motor limits.
 
