@@ -483,7 +483,7 @@ pub(crate) enum Machine {
         /// Name of a preset, or a machine file
         name: String,
     },
-    /// Check a machine file: does it hold together, and does it reach its sheet
+    /// Check a machine file: validity, and reach of its sheet
     Check {
         /// Machine file, or the name of a preset
         file: String,

@@ -42,7 +42,7 @@ struct Edge {
 }
 
 impl Area {
-    /// The inside of subpaths (mm), each closed by a line if it is open; nothing if they have no
+    /// The inside of subpaths (mm), each closed by a line if it is open; `None` if they have no
     /// extent.
     pub(crate) fn new(subpaths: &[Subpath], rule: FillRule) -> Option<Self> {
         let mut edges: Vec<Edge> = Vec::new();

@@ -4,7 +4,7 @@ use drawing::{CubicBez, EllipticArc, Line, Point, Rect, Segment, Vec2};
 
 /// Chords that bracket crossings of two curves stay this close to them, mm.
 const CHORD_MM: f64 = 0.02;
-/// At most so many chords per curve.
+/// Largest number of chords per curve.
 const MOST_CHORDS: usize = 256;
 /// Crossings of two curves are refined until both points are this close, mm.
 const CLOSE_MM: f64 = 1e-10;

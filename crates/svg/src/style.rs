@@ -80,7 +80,7 @@ pub(crate) struct Style<'a> {
     pub(crate) overflow_visible: bool,
     pub(crate) transform: Option<&'a str>,
     pub(crate) transform_origin: Option<&'a str>,
-    /// Raised by so many user units (`baseline-shift`).
+    /// Baseline shift, user units.
     pub(crate) baseline_shift: f64,
 }
 

@@ -4,7 +4,7 @@ use drawing::{Affine, Rect};
 use roxmltree::Node;
 use svgtypes::{Align, AspectRatio, ViewBox};
 
-/// The view box of an element; nothing if there is none, or an invalid one.
+/// The view box of an element; `None` if it is missing or invalid.
 pub(crate) fn view_box(node: Node<'_, '_>) -> Option<ViewBox> {
     node.attribute("viewBox")?.trim().parse().ok()
 }

@@ -192,7 +192,7 @@ impl<'a> Walker<'a, '_> {
         }
     }
 
-    /// The scope inside an element: its style, transform and clip path; nothing if it is hidden.
+    /// The scope inside an element: its style, transform and clip path; `None` if it is hidden.
     fn enter(&mut self, node: Element<'a>, scope: &Scope<'a>) -> Option<Scope<'a>> {
         let style = self.style(node, &scope.style, scope.basis());
         if !style.displayed || style.opacity <= 0.0 {

@@ -39,7 +39,7 @@ fn list() -> String {
 fn check(file: &str) -> Result<String, Failure> {
     let machine = machines::machine(file)?.machine;
     let sheet = machine.sheet();
-    let mut text = format!("{} holds together\n", machine.name());
+    let mut text = format!("{} is valid\n", machine.name());
     let joints = machine.mechanism().joint_names();
     for (k, motor) in machine.motors().iter().enumerate() {
         let row = machine.coupling().rows()[k];

@@ -110,7 +110,7 @@ impl<'a> Walker<'a, '_> {
         }
     }
 
-    /// The colour of a paint; nothing if it paints nothing.
+    /// The colour of a paint; `None` if it paints nothing.
     pub(crate) fn color_of(
         &mut self,
         paint: Paint<'a>,
