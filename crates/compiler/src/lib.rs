@@ -20,6 +20,7 @@
 //!     period_us: 10_000,
 //!     order: Order::Optimize(ordering::Options::default()),
 //!     placement: PlacementOptions::default(),
+//!     crop: None,
 //!     pen_speeds: Vec::new(),
 //!     lift_overlap_s: 0.0,
 //!     timing_law: TimingLaw::TimeOptimal,
@@ -35,6 +36,7 @@
 //! ```
 
 pub mod import;
+pub mod layout;
 pub mod machine_file;
 pub mod paper;
 pub mod pipeline;

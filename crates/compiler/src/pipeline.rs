@@ -2,13 +2,13 @@
 //!
 //! Start reading at [`compile`].
 
-use drawing::{Affine, Drawing, Pen, Point};
+use drawing::{Affine, Drawing, Pen, Point, Rect, Vec2};
 use kinematics::{JointPos, Machine};
 use plan::{Header, Limits, Motor};
-use planner::PlacementOptions;
-use planner::{PlanError, Settings, TimingLaw, Trajectory};
+use planner::{PlacementOptions, PlanError, Settings, Surface, TimingLaw, Trajectory};
 use verify::Certificate;
 
+use crate::layout::{Crop, cropped};
 use crate::same_ink::same_ink;
 
 /// The order in which strokes are drawn.
@@ -42,6 +42,8 @@ pub struct Request {
     pub order: Order,
     /// Placement of the drawing on the machine.
     pub placement: PlacementOptions,
+    /// What is kept of the placed drawing; all if `None`.
+    pub crop: Option<Crop>,
     /// Drawing speeds of single pens, mm/s; the machine's own limit still holds.
     pub pen_speeds: Vec<(Pen, f64)>,
     /// Part of the lift time during which the motors may already travel, s.
@@ -128,17 +130,130 @@ pub struct Placed {
     pub beyond_sheet_mm: f64,
 }
 
-/// Places a drawing on a machine and checks that the machine reaches all of it.
+/// Places a drawing on a machine, crops it and checks that the machine reaches what is left.
 ///
 /// # Errors
-/// When the drawing has no ink, cannot be placed, or leaves the machine's reach.
-pub fn place(drawing: &Drawing, machine: &Machine, options: &PlacementOptions) -> Result<Placed, PlanError> {
-    let placement = planner::place(machine, drawing, options)?;
+/// When the drawing has no ink, cannot be placed, leaves the machine's reach, or when the crop leaves
+/// nothing of it.
+pub fn place(
+    drawing: &Drawing,
+    machine: &Machine,
+    options: &PlacementOptions,
+    crop: Option<Crop>,
+) -> Result<Placed, PlanError> {
+    let placed = place_on(drawing, machine, options, crop)?;
+    planner::check_reach(machine, &placed.drawing)?;
+    Ok(placed)
+}
+
+/// Places and crops a drawing on any surface. A drawing that stays where it is keeps its bits.
+fn place_on(
+    drawing: &Drawing,
+    surface: &dyn Surface,
+    options: &PlacementOptions,
+    crop: Option<Crop>,
+) -> Result<Placed, PlanError> {
+    let placement = planner::place(surface, drawing, options)?;
     let mut drawing = drawing.clone();
-    drawing.transform(placement);
-    planner::check_reach(machine, &drawing)?;
-    let beyond_sheet_mm = planner::beyond_sheet_mm(machine, &drawing);
+    if placement != Affine::IDENTITY {
+        drawing.transform(placement);
+    }
+    let drawing = cropped(drawing, crop, surface.sheet());
+    if drawing.is_empty() {
+        return Err(PlanError::NoPlacement { why: "no ink lies within the crop window" });
+    }
+    let beyond_sheet_mm = planner::beyond_sheet_mm(surface, &drawing);
     Ok(Placed { placement, drawing, beyond_sheet_mm })
+}
+
+/// What a drawing is arranged for.
+#[derive(Clone, Copy, Debug)]
+pub enum Target<'a> {
+    /// A machine: its sheet, its reach, and its travel times.
+    Machine(&'a Machine),
+    /// A sheet of this width and height, mm.
+    Sheet([f64; 2]),
+    /// A plane without edges.
+    Plane,
+}
+
+impl Target<'_> {
+    /// The sheet in the target's own frame, mm; with infinite edges for a plane.
+    pub fn sheet(&self) -> Rect {
+        match *self {
+            Self::Machine(machine) => machine.sheet(),
+            Self::Sheet([width, height]) => Rect::new(0.0, 0.0, width, height),
+            Self::Plane => Rect::new(0.0, 0.0, f64::INFINITY, f64::INFINITY),
+        }
+    }
+}
+
+/// A drawing arranged for a target without planning any motion.
+#[derive(Clone, Debug)]
+pub struct Arranged {
+    /// The placed, cropped and ordered drawing; mm from the lower-left corner of the sheet.
+    pub drawing: Drawing,
+    /// How far ink reaches beyond the sheet, mm; 0 if it does not, or on a plane.
+    pub beyond_sheet_mm: f64,
+    /// The effect of ordering; `None` for the file's order.
+    pub ordering: Option<ordering::Report>,
+}
+
+/// Places, crops and orders a drawing: for a machine as [`compile`] does, otherwise by the length of
+/// travel, from the sheet's lower-left corner and back.
+///
+/// # Errors
+/// Those of [`place`]; on a plane, options that need a sheet.
+pub fn arrange(
+    drawing: &Drawing,
+    target: Target<'_>,
+    placement: &PlacementOptions,
+    crop: Option<Crop>,
+    order: &Order,
+) -> Result<Arranged, PlanError> {
+    let sheet = target.sheet();
+    let placed = match target {
+        Target::Machine(machine) => place(drawing, machine, placement, crop)?,
+        Target::Sheet(_) => place_on(drawing, &sheet, placement, crop)?,
+        Target::Plane => {
+            let needs_sheet = !matches!(placement.scale, planner::Scale::Explicit { .. });
+            if needs_sheet || crop == Some(Crop::Sheet) {
+                return Err(PlanError::Setting { what: "fit, align and crop to the sheet need a sheet" });
+            }
+            let placed = place_on(drawing, &sheet, placement, crop)?;
+            Placed { beyond_sheet_mm: 0.0, ..placed }
+        }
+    };
+    let corner = Vec2::new(sheet.x0, sheet.y0);
+    let by_distance = |a: Point, b: Point| ordering::distance(a, b);
+    let (mut drawing, ordering) = match (order, target) {
+        (Order::File, _) => (placed.drawing, None),
+        (Order::Optimize(options), Target::Machine(machine)) => {
+            let (ordered, report) = by_travel_time(placed.drawing, machine, options);
+            (ordered, Some(report))
+        }
+        (Order::Optimize(options), _) => {
+            let home = Some(corner.to_point());
+            let options = ordering::Options { start: home, park: home, ..options.clone() };
+            let (ordered, report) = ordering::optimize(placed.drawing, &by_distance, &options);
+            (ordered, Some(report))
+        }
+    };
+    if corner != Vec2::ZERO {
+        drawing.transform(Affine::translate(-corner));
+    }
+    Ok(Arranged { drawing, beyond_sheet_mm: placed.beyond_sheet_mm, ordering })
+}
+
+/// Orders strokes by the time of travel, from the machine's start position and back.
+fn by_travel_time(
+    drawing: Drawing,
+    machine: &Machine,
+    options: &ordering::Options,
+) -> (Drawing, ordering::Report) {
+    let start = machine.mechanism().forward(&machine.start());
+    let options = ordering::Options { start: Some(start), park: Some(start), ..options.clone() };
+    ordering::optimize(drawing, &TravelTime(machine), &options)
 }
 
 /// Places the drawing, orders its strokes, plans and verifies. `progress` is called at every step.
@@ -152,15 +267,14 @@ pub fn compile<'a>(
     progress: &dyn Fn(Step),
 ) -> Result<Compiled<'a>, PlanError> {
     progress(Step::Placing);
-    let Placed { placement, drawing: placed, beyond_sheet_mm } = place(drawing, machine, &request.placement)?;
+    let Placed { placement, drawing: placed, beyond_sheet_mm } =
+        place(drawing, machine, &request.placement, request.crop)?;
 
     let (ordered, ordering) = match &request.order {
         Order::File => (placed.clone(), None),
         Order::Optimize(options) => {
             progress(Step::Ordering);
-            let start = machine.mechanism().forward(&machine.start());
-            let options = ordering::Options { start: Some(start), park: Some(start), ..options.clone() };
-            let (ordered, report) = ordering::optimize(placed.clone(), &TravelTime(machine), &options);
+            let (ordered, report) = by_travel_time(placed.clone(), machine, options);
             (ordered, Some(report))
         }
     };

@@ -2,23 +2,30 @@
 
 use drawing::{Drawing, Point, Rect};
 use kinematics::{Machine, reach_outlines};
-use picture::{Ink, Scene};
+use picture::{Ink, PenColors, Scene};
 use plan::Row;
 
+use crate::import::Page;
 use crate::replay::{Motion, Polyline};
 
 /// Chords of curves in a picture deviate by at most this, mm.
 const CHORD_MM: f64 = 0.02;
 
-/// A drawing without a machine: the sheet is the bounding box of its ink.
-pub fn of_drawing(title: &str, drawing: &Drawing) -> Scene {
-    let sheet = drawing.bounding_box().unwrap_or(Rect::ZERO);
-    scene(title, sheet, Vec::new(), drawing, None)
+/// A drawing without a machine, on a sheet; without a sheet, on the bounding box of its ink.
+pub fn of_drawing(title: &str, drawing: &Drawing, sheet: Option<Rect>, colors: PenColors) -> Scene {
+    let sheet = sheet.or_else(|| drawing.bounding_box()).unwrap_or(Rect::ZERO);
+    Scene { colors, ..scene(title, sheet, Vec::new(), drawing, None) }
 }
 
 /// A placed drawing on its machine, in the file's order, with straight travel.
-pub fn of_placed(title: &str, drawing: &Drawing, machine: &Machine) -> Scene {
-    scene(title, machine.sheet(), reach_outlines(machine), drawing, Some(start_point(machine)))
+pub fn of_placed(title: &str, drawing: &Drawing, machine: &Machine, colors: PenColors) -> Scene {
+    let start = Some(start_point(machine));
+    Scene { colors, ..scene(title, machine.sheet(), reach_outlines(machine), drawing, start) }
+}
+
+/// The colours that a file gives its pens.
+pub fn pen_colors(page: &Page) -> PenColors {
+    page.pens.iter().filter_map(|(pen, settings)| Some((pen.0, settings.color?))).collect()
 }
 
 /// The rows of a plan on its machine.
@@ -29,6 +36,7 @@ pub fn of_plan(title: &str, rows: &[Row], machine: &Machine) -> Scene {
         sheet: machine.sheet(),
         reach: reach_outlines(machine),
         ink: ink.into_iter().map(|Polyline { pen, points }| Ink { pen, points }).collect(),
+        colors: PenColors::new(),
         travel: travel.into_iter().map(|line| line.points).collect(),
         start: Some(start_point(machine)),
     }
@@ -55,5 +63,5 @@ fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, st
     if let (Some(from), Some(to)) = (here, start) {
         travel.push(vec![from, to]);
     }
-    Scene { title: title.to_owned(), sheet, reach, ink, travel, start }
+    Scene { title: title.to_owned(), sheet, reach, ink, colors: PenColors::new(), travel, start }
 }

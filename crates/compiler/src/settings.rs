@@ -6,6 +6,7 @@ use planner::{Easing, Mirror, PlacementOptions, Scale, TimingLaw};
 use serde::Serialize;
 
 use crate::import;
+use crate::layout::Layout;
 use crate::pipeline::{Order, Request};
 
 /// How a plan was made. With the document's machine and the drawing of its `source.sha256`,
@@ -21,6 +22,9 @@ pub struct Settings {
     /// Options of the drawing's reader.
     #[serde(flatten)]
     pub reading: import::Options,
+    /// What is drawn of the drawing: pens, copies, crop.
+    #[serde(skip_serializing_if = "Layout::is_default")]
+    pub layout: Layout,
     /// Largest distance between the drawing and the continuous path, mm.
     pub tolerance_mm: f64,
     /// Time between rows, microseconds.
@@ -77,7 +81,13 @@ pub struct PlacementSettings {
 
 impl Settings {
     /// The settings of a request. `command_line` holds the options that led to it.
-    pub fn of(request: &Request, page: usize, reading: &import::Options, command_line: Vec<String>) -> Self {
+    pub fn of(
+        request: &Request,
+        page: usize,
+        reading: &import::Options,
+        layout: &Layout,
+        command_line: Vec<String>,
+    ) -> Self {
         let (law, segment_time_s) = match request.timing_law {
             TimingLaw::TimeOptimal => ("time-optimal", None),
             TimingLaw::Trapezoid => ("trapezoid", None),
@@ -104,6 +114,7 @@ impl Settings {
             command_line,
             page,
             reading: reading.clone(),
+            layout: layout.clone(),
             tolerance_mm: request.tolerance_mm,
             period_us: request.period_us,
             order: request.order.name(),

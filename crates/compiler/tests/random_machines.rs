@@ -41,6 +41,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         period_us: 10_000,
         order: Order::File,
         placement: PlacementOptions { scale, ..PlacementOptions::default() },
+        crop: None,
         pen_speeds: Vec::new(),
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::default(),

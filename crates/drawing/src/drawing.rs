@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use kurbo::{Affine, Rect};
 
-use crate::{Pen, Stroke};
+use crate::{Pen, Side, Stroke, clip_stroke};
 
 /// The ink on the paper: strokes in the order in which they are drawn; mm, y up.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,6 +34,12 @@ impl Drawing {
         for stroke in &mut self.strokes {
             stroke.transform(map);
         }
+    }
+
+    /// The parts of its strokes on one side of the window; see [`clip_stroke`].
+    #[must_use]
+    pub fn clipped(&self, window: Rect, side: Side) -> Self {
+        Self { strokes: self.strokes.iter().flat_map(|stroke| clip_stroke(stroke, window, side)).collect() }
     }
 
     /// The pens of its strokes, each once, in ascending order.

@@ -45,7 +45,7 @@ mod segment;
 mod stroke;
 
 pub use arc::EllipticArc;
-pub use clip::clip_segment;
+pub use clip::{Side, clip_segment, clip_stroke};
 pub use distance::{distance, distance_to_line};
 pub use drawing::Drawing;
 pub use hatch::{FillRule, HatchGrid, HatchLine};

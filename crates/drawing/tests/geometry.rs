@@ -1,8 +1,8 @@
 //! Properties of the geometry: affine maps, reversal, flattening, clipping.
 
 use drawing::{
-    Affine, CubicBez, EllipticArc, Line, Pen, Pitch, Point, Rect, Segment, Span, Stroke, Vec2, clip_segment,
-    distance_to_line,
+    Affine, CubicBez, EllipticArc, Line, Pen, Pitch, Point, Rect, Segment, Side, Span, Stroke, Vec2,
+    clip_segment, clip_stroke, distance_to_line,
 };
 use proptest::prelude::*;
 
@@ -138,6 +138,52 @@ proptest! {
     }
 
     #[test]
+    fn clipped_strokes_conserve_length(
+        list in proptest::collection::vec(segment(), 1..6),
+        closed in any::<bool>(),
+        a in point(),
+        b in point(),
+    ) {
+        let mut stroke = Stroke::new(Pen(3), list[0].start(), Span { start: 5, end: 8 });
+        for s in &list {
+            stroke.line_to(s.start());
+            stroke.push(*s);
+        }
+        if closed {
+            stroke.line_to(list[0].start());
+        }
+        let window = Rect::from_points(a, b);
+        let [inside, outside] = [Side::Inside, Side::Outside].map(|side| clip_stroke(&stroke, window, side));
+        for part in &inside {
+            let bounds = part.bounding_box();
+            let larger = window.inflate(1e-6, 1e-6);
+            prop_assert_eq!(larger.union(bounds), larger, "{:?} leaves {:?}", bounds, window);
+            prop_assert_eq!((part.pen, part.source()), (stroke.pen, stroke.source()));
+        }
+        for part in &outside {
+            for segment in part.segments() {
+                prop_assert!(!window.inset(-1e-6).contains(segment.eval(0.5)), "{:?}", segment);
+            }
+        }
+        let length = |parts: &[Stroke]| parts.iter().map(Stroke::length).sum::<f64>();
+        let kinds = |strokes: &[Stroke], curved: bool| {
+            let segments = strokes.iter().flat_map(Stroke::segments);
+            let of_kind = segments.filter(|s| matches!(s, Segment::Line(_)) != curved);
+            of_kind.map(|s| s.length()).sum::<f64>()
+        };
+        let all = [stroke.clone()];
+        // Quadrature of each part of a cubic is accurate to 1e-6 mm.
+        let tolerance = 1e-4 + 1e-9 * stroke.length();
+        prop_assert!((length(&inside) + length(&outside) - stroke.length()).abs() < tolerance);
+        for curved in [false, true] {
+            let sum = kinds(&inside, curved) + kinds(&outside, curved);
+            prop_assert!((sum - kinds(&all, curved)).abs() < tolerance, "curves stay curves");
+        }
+        // Every cut makes one part more at most.
+        prop_assert!(inside.len() + outside.len() <= 1 + 12 * stroke.segment_count());
+    }
+
+    #[test]
     fn reversing_a_stroke_twice_restores_it(list in proptest::collection::vec(segment(), 0..8)) {
         let mut stroke = Stroke::new(Pen(1), Point::ZERO, Span::default());
         for s in list {
@@ -200,4 +246,34 @@ fn dot_has_no_length_and_flattens_to_one_point() {
     assert!(dot.is_dot());
     assert_eq!(dot.length(), 0.0);
     assert_eq!(dot.flatten(0.1), vec![Point::new(1.0, 1.0)]);
+}
+
+#[test]
+fn clipped_circle_continues_over_its_start() {
+    let mut circle = Stroke::new(Pen(1), Point::new(10.0, 0.0), Span::default());
+    let arc = EllipticArc::circular(Point::ZERO, 10.0, 0.0, std::f64::consts::TAU);
+    circle.arc_to(arc, Point::new(10.0, 0.0));
+    // The right half: one arc over the start.
+    let window = Rect::new(0.0, -20.0, 20.0, 20.0);
+    let parts = clip_stroke(&circle, window, Side::Inside);
+    assert_eq!(parts.len(), 1);
+    assert!((parts[0].length() - 10.0 * std::f64::consts::PI).abs() < 1e-9);
+    assert!(parts[0].segments().all(|segment| matches!(segment, Segment::Arc(_))));
+    assert!(parts[0].start().distance(Point::new(0.0, -10.0)) < 1e-9);
+    // A tangent only touches: no ink inside, all of it outside.
+    let beside = Rect::new(10.0, -5.0, 20.0, 5.0);
+    assert!(clip_stroke(&circle, beside, Side::Inside).is_empty());
+    let outside = clip_stroke(&circle, beside, Side::Outside);
+    assert!((outside.iter().map(Stroke::length).sum::<f64>() - circle.length()).abs() < 1e-9);
+    // Windows without area hold nothing.
+    assert!(clip_stroke(&circle, Rect::ZERO, Side::Inside).is_empty());
+    assert_eq!(clip_stroke(&circle, Rect::ZERO, Side::Outside), [circle]);
+}
+
+#[test]
+fn clipped_dot_stays_or_goes() {
+    let dot = Stroke::new(Pen(1), Point::new(1.0, 1.0), Span::default());
+    let window = Rect::new(0.0, 0.0, 1.0, 1.0);
+    assert_eq!(clip_stroke(&dot, window, Side::Inside), [dot.clone()]);
+    assert!(clip_stroke(&dot, window, Side::Outside).is_empty());
 }

@@ -240,6 +240,9 @@ codes! {
         "PC gives a pen the colour white, and the pen draws. Printers use white to erase ink or to draw nothing; a pen \
          plotter has no white ink, so that the pen in its place would draw over the rest. The ink is in the drawing. If \
          it is not wanted, remove the pen from the file."
+    CUT_AT_LIMITS = 230 "H0230" Warning "cut at the plotter's limits"
+        "Ink outside the hard clip limits of the plotter and paper named in the options is not drawn: the pen cannot go \
+         there. Name a larger paper if it should be drawn. Without a named plotter, nothing is cut at its limits."
 }
 
 #[cfg(test)]

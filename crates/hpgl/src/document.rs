@@ -28,7 +28,7 @@ pub struct Page {
 }
 
 /// Settings of a pen on one page. Where they change in the course of a page: the least speed, force
-/// and acceleration, and the last width.
+/// and acceleration, and the last width and colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PenSettings {
     /// Speed with the pen down, mm/s (`VS`).
@@ -39,4 +39,6 @@ pub struct PenSettings {
     pub acceleration: Option<f64>,
     /// Width of the line, mm (`PW`).
     pub width_mm: Option<f64>,
+    /// Red, green and blue, where the file states them (`PC`) and they are not white.
+    pub color: Option<[u8; 3]>,
 }

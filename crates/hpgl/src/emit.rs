@@ -1,6 +1,8 @@
 //! Writing HP-GL: the plainest words of the language, so that every reader takes them.
 
-use drawing::{Drawing, Point, Stroke};
+use std::collections::BTreeMap;
+
+use drawing::{Drawing, Pen, Point, Stroke};
 
 use crate::units::PLOTTER_UNIT_MM;
 
@@ -30,6 +32,8 @@ pub struct EmitOptions {
     pub tolerance_mm: f64,
     /// How coordinates are written.
     pub encoding: Encoding,
+    /// Colours of pens, red, green and blue. Written (`PC`) only with the encodings of HP-GL/2.
+    pub colors: BTreeMap<Pen, [u8; 3]>,
 }
 
 impl Default for EmitOptions {
@@ -39,12 +43,13 @@ impl Default for EmitOptions {
             plotter_unit_mm: PLOTTER_UNIT_MM,
             tolerance_mm: PLOTTER_UNIT_MM / 4.0,
             encoding: Encoding::Decimal,
+            colors: BTreeMap::new(),
         }
     }
 }
 
-/// Writes a drawing in absolute whole plotter units, with `IN SP PU PD` (or `IN SP PE PU`) and
-/// nothing else.
+/// Writes a drawing in absolute whole plotter units, with `IN SP PU PD` (or `IN PC SP PE PU`)
+/// and nothing else.
 ///
 /// Strokes come in the order of the drawing, each from its first point to its last; dots are `PD`
 /// without coordinates. Points that round to the same whole units become one. Strokes of pen 0 draw
@@ -52,6 +57,11 @@ impl Default for EmitOptions {
 /// again, it gives the same bytes.
 pub fn emit(drawing: &Drawing, options: &EmitOptions) -> Vec<u8> {
     let mut out = b"IN;\n".to_vec();
+    if options.encoding != Encoding::Decimal {
+        for (Pen(pen), [red, green, blue]) in &options.colors {
+            out.extend_from_slice(format!("PC{pen},{red},{green},{blue};\n").as_bytes());
+        }
+    }
     let mut pen = 0;
     for stroke in drawing.strokes.iter().filter(|stroke| stroke.pen.0 > 0) {
         if stroke.pen.0 != pen {

@@ -12,9 +12,11 @@ pub struct Options {
     /// The scaling points P1 and P2 until the file sets others, plotter units.
     pub scaling_points: (Point, Point),
     /// The area that the plotter can reach, plotter units. `RO` turns within it and `IR` measures
-    /// by it; ink is not clipped to it, since many files are made for larger plotters than they
-    /// name.
+    /// by it.
     pub hard_clip: Rect,
+    /// Whether ink outside `hard_clip` is cut off, as the plotter does. Not by default: many files
+    /// are made for larger plotters than the one that is assumed.
+    pub clips_at_limits: bool,
     /// Whether the file may choose scaling points and hard clip: by the paper that `PS` names by
     /// its code, and by being HP-GL/2, where P1 and P2 are the corners of the page.
     pub automatic: bool,
@@ -27,7 +29,7 @@ impl Default for Options {
     /// all other machines; the file may choose otherwise.
     fn default() -> Self {
         let [a4, ..] = PAPERS_7475A;
-        Self { automatic: true, ..Self::on(PLOTTER_UNIT_MM, a4) }
+        Self { automatic: true, clips_at_limits: false, ..Self::on(PLOTTER_UNIT_MM, a4) }
     }
 }
 
@@ -39,6 +41,7 @@ impl Options {
             plotter_unit_mm,
             scaling_points: (Point::new(x1, y1), Point::new(x2, y2)),
             hard_clip: Rect::new(left, bottom, right, top),
+            clips_at_limits: true,
             automatic: false,
             label_terminator: None,
         }

@@ -593,3 +593,31 @@ fn coloured_pen_zero_is_drawn() {
     let white = b"BPIN;PC0,255,255,255;SP0;PU0,0;PD400,0;SP1;PU0,40;PD400,40;PU;";
     check(white, &["1: 0,40 400,40"], &["H0202"]);
 }
+
+/// The pen of a named plotter cannot leave its hard clip limits; an assumed plotter cuts nothing.
+#[test]
+fn named_plotter_cuts_at_its_limits() {
+    let file = b"IN;SP1;PU11000,100;PD11140,100;PU0,7621;PD0,7821;";
+    let a4 = Options::for_plotter("hp7475a", None).expect("built in");
+    let unit = a4.plotter_unit_mm;
+    let cut = read(file, &a4);
+    let lengths: Vec<f64> = cut.pages[0].drawing.strokes.iter().map(|stroke| stroke.length() / unit).collect();
+    assert!((lengths[0] - 40.0).abs() < 1e-6 && (lengths[1] - 100.0).abs() < 1e-6, "{lengths:?}");
+    assert!(cut.diagnostics.iter().any(|found| found.code.name() == "H0230"), "{:?}", cut.diagnostics);
+    let whole = read(file, &Options::default());
+    assert!((whole.pages[0].drawing.length() / 0.025 - 340.0).abs() < 1e-6);
+    // IW is within the limits: a window beyond them lets no more ink through.
+    let window = read(b"IN;IW10000,0,12000,500;SP1;PU9000,100;PD12000,100;", &a4);
+    assert!((window.pages[0].drawing.length() / unit - 1040.0).abs() < 1e-6);
+    // The limits turn with RO.
+    let turned = read(b"IN;RO90;IP;SP1;PU100,11000;PD100,11140;PU7621,0;PD7821,0;", &a4);
+    assert!((turned.pages[0].drawing.length() / unit - 140.0).abs() < 1e-6);
+}
+
+#[test]
+fn pen_colours_of_pc_are_kept() {
+    let file = b"BP;IN;NP8;CR0,100,0,100,0,100;PC2,100,0,50;PC3,100,100,100;SP1;PD1,1;SP2;PD2,2;SP3;PD3,3;";
+    let page = &read(file, &Options::default()).pages[0];
+    let color = |pen: u16| page.pens[&hpgl::Pen(pen)].color;
+    assert_eq!([color(1), color(2), color(3)], [None, Some([255, 0, 128]), None]);
+}

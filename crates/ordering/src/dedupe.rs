@@ -1,6 +1,6 @@
 //! Removal of duplicate strokes.
 
-use drawing::{Point, Segment, Stroke};
+use drawing::{Drawing, Point, Segment, Stroke};
 
 use crate::touch::square;
 
@@ -20,11 +20,33 @@ fn segment_key(segment: &Segment) -> SegmentKey {
     forward.min(backward)
 }
 
-/// Removes each stroke (all of one pen) whose segments are all drawn by other strokes, starting
-/// with the last stroke. A dot on a vertex of a stroke, or on another dot, is a duplicate too.
+/// Removes each stroke whose segments are all drawn by other strokes of its pen, starting with the
+/// last stroke. Order and direction stay.
+#[must_use]
+pub fn without_duplicates(drawing: Drawing) -> Drawing {
+    let mut keep = vec![true; drawing.strokes.len()];
+    for pen in drawing.pens() {
+        let mine: Vec<usize> = (0..keep.len()).filter(|&at| drawing.strokes[at].pen == pen).collect();
+        let strokes: Vec<&Stroke> = mine.iter().map(|&at| &drawing.strokes[at]).collect();
+        for (at, keeps) in mine.into_iter().zip(kept(&strokes)) {
+            keep[at] = keeps;
+        }
+    }
+    let strokes = drawing.strokes.into_iter().zip(keep).filter_map(|(stroke, keep)| keep.then_some(stroke));
+    Drawing { strokes: strokes.collect() }
+}
+
+/// Removes the duplicates among strokes of one pen.
 pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
+    let keep = kept(&strokes.iter().collect::<Vec<_>>());
+    strokes.into_iter().zip(keep).filter_map(|(stroke, keep)| keep.then_some(stroke)).collect()
+}
+
+/// For each stroke (all of one pen) whether it stays: not if all of its segments are drawn by other
+/// strokes. A dot on a vertex of a stroke, or on another dot, is a duplicate too.
+fn kept(strokes: &[&Stroke]) -> Vec<bool> {
     let mut keys: Vec<(SegmentKey, u32)> = Vec::new();
-    for stroke in &strokes {
+    for stroke in strokes {
         for segment in stroke.segments() {
             keys.push((segment_key(&segment), keys.len() as u32));
         }
@@ -42,7 +64,7 @@ pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
     let dot = |p: Point| square(Point::new(p.x + 0.25e-6, p.y + 0.25e-6));
     let lines = strokes.iter().filter(|stroke| !stroke.is_dot());
     let mut inked: Vec<([i64; 2], usize)> =
-        lines.flat_map(Stroke::points).map(|vertex| (dot(vertex), 0)).collect();
+        lines.flat_map(|stroke| stroke.points()).map(|vertex| (dot(vertex), 0)).collect();
     inked.extend(
         strokes.iter().enumerate().filter(|(_, s)| s.is_dot()).map(|(at, s)| (dot(s.start()), at + 1)),
     );
@@ -68,5 +90,5 @@ pub(crate) fn dedupe(strokes: Vec<Stroke>) -> Vec<Stroke> {
             }
         }
     }
-    strokes.into_iter().zip(keep).filter_map(|(stroke, keep)| keep.then_some(stroke)).collect()
+    keep
 }

@@ -41,6 +41,7 @@ mod touch;
 use drawing::{Drawing, Pen, Point, Stroke};
 
 pub use cost::{Cost, CostPoint};
+pub use dedupe::without_duplicates;
 /// The distance in the plane, mm: the [`Cost`] without a machine.
 pub use drawing::distance;
 pub use options::Options;

@@ -11,4 +11,5 @@ pub mod png;
 pub mod scene;
 pub mod svg;
 
+pub use palette::{Colour, PenColors};
 pub use scene::{Ink, Scene};

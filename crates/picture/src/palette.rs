@@ -1,7 +1,9 @@
 //! Colours for pens.
 
+use std::collections::BTreeMap;
+
 /// Red, green and blue, 0 to 255.
-pub(crate) type Colour = [u8; 3];
+pub type Colour = [u8; 3];
 
 /// Colours that stay apart for colour-blind eyes and stand out on white paper: those of Okabe and Ito ("Color
 /// Universal Design", 2002) without their yellow, which white paper swallows, and the wine red of Tol's muted scheme
@@ -17,12 +19,44 @@ const PENS: [Colour; 8] = [
     [0x88, 0x22, 0x55],
 ];
 
-/// The colour of a pen, from 1 up; they come round again after the eighth.
-pub(crate) fn pen_colour(pen: u16) -> Colour {
-    PENS[usize::from(pen.saturating_sub(1)) % PENS.len()]
+/// The colours that a drawing gives its pens: red, green and blue by pen number. Pens without an
+/// entry have one of the palette's.
+pub type PenColors = BTreeMap<u16, Colour>;
+
+/// The colour of a pen, from 1 up: the drawing's own, or one of the palette, which repeats after the
+/// eighth.
+pub(crate) fn pen_colour(pen: u16, own: &PenColors) -> Colour {
+    own.get(&pen).copied().unwrap_or(PENS[usize::from(pen.saturating_sub(1)) % PENS.len()])
+}
+
+/// Colours lighter than this do not show on white paper: relative luminance (ITU-R BT.709), of 255.
+const LIGHTEST: f64 = 235.0;
+
+/// The colour of a pen on white paper. Pens that would not show there have a colour of the palette.
+pub(crate) fn colour_on_white(pen: u16, own: &PenColors) -> Colour {
+    let [red, green, blue] = pen_colour(pen, own).map(f64::from);
+    let luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+    if luminance > LIGHTEST { pen_colour(pen, &PenColors::new()) } else { pen_colour(pen, own) }
 }
 
 /// The colour as SVG writes it.
 pub(crate) fn hex([red, green, blue]: Colour) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_colours_win_unless_white_paper_hides_them() {
+        let own = PenColors::from([(1, [0, 128, 0]), (2, [255, 255, 255]), (3, [255, 255, 0])]);
+        assert_eq!(pen_colour(1, &own), [0, 128, 0]);
+        assert_eq!(pen_colour(2, &own), [255, 255, 255]);
+        assert_eq!(colour_on_white(1, &own), [0, 128, 0]);
+        assert_eq!(colour_on_white(2, &own), PENS[1]);
+        // Yellow has a luminance of 237: too light for a thin line.
+        assert_eq!(colour_on_white(3, &own), PENS[2]);
+        assert_eq!(pen_colour(9, &own), PENS[0]);
+    }
 }

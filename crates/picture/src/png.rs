@@ -5,7 +5,7 @@
 use drawing::{Point, Rect};
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, StrokeDash, Transform};
 
-use crate::palette::{Colour, pen_colour};
+use crate::palette::{Colour, colour_on_white};
 use crate::scene::{
     DASH_MM, INK_MM, OUTLINE_MM, REACH_FILL, REACH_LINE, SHEET_LINE, START, Scene, TRAVEL, TRAVEL_MM,
 };
@@ -51,7 +51,7 @@ pub fn encode(scene: &Scene, longer_px: u32) -> Result<Vec<u8>, PngError> {
     }
     for pen in scene.pens() {
         for ink in scene.ink.iter().filter(|ink| ink.pen == pen) {
-            canvas.line(&ink.points, false, pen_colour(pen), INK_MM, None);
+            canvas.line(&ink.points, false, colour_on_white(pen, &scene.colors), INK_MM, None);
         }
     }
     if let Some(start) = scene.start {

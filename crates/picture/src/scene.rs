@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use drawing::{Point, Rect};
 
-use crate::palette::{Colour, hex, pen_colour};
+use crate::palette::{Colour, PenColors, colour_on_white, hex};
 use crate::svg::{point, polyline, view_box};
 use plan::file::text::Text;
 
@@ -31,6 +31,8 @@ pub struct Scene {
     pub reach: Vec<Vec<Point>>,
     /// What is drawn, in its order.
     pub ink: Vec<Ink>,
+    /// The pens' own colours.
+    pub colors: PenColors,
     /// The ways with the pen up.
     pub travel: Vec<Vec<Point>>,
     /// Where the pen starts.
@@ -100,7 +102,7 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
     }
     text.str("\"/>\n");
     for pen in scene.pens() {
-        text.str("<g id=\"pen").int(pen).str("\" stroke=\"").str(&hex(pen_colour(pen)));
+        text.str("<g id=\"pen").int(pen).str("\" stroke=\"").str(&hex(colour_on_white(pen, &scene.colors)));
         text.str("\" stroke-width=\"").fixed(INK_MM).str("\">\n");
         for ink in scene.ink.iter().filter(|ink| ink.pen == pen && !ink.points.is_empty()) {
             text.str("<path d=\"");
@@ -157,7 +159,7 @@ impl Legend {
                 left + 6.0 * self.size_mm * (index % self.pens_a_line) as f64,
                 line(3 + index / self.pens_a_line),
             );
-            text.str("<path stroke=\"").str(&hex(pen_colour(pen))).str("\" stroke-width=\"");
+            text.str("<path stroke=\"").str(&hex(colour_on_white(pen, &scene.colors))).str("\" stroke-width=\"");
             text.fixed(0.3 * self.size_mm).str("\" d=\"M");
             point(text, at + (0.0, 0.3 * self.size_mm));
             text.byte(b'h').fixed(1.2 * self.size_mm).str("\"/>\n");

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use drawing::{Drawing, EllipticArc, Point, Rect, Segment, Stroke};
 
-use crate::palette::{hex, pen_colour};
+use crate::palette::{PenColors, hex, pen_colour};
 use plan::file::text::Text;
 
 /// Width of the lines, mm: a common fibre pen's.
@@ -18,17 +18,27 @@ const MARGIN_MM: f64 = 1.0;
 /// Where an ellipse is too flat for SVG's arcs, chords stay this close to it, mm.
 const FLAT_TOLERANCE_MM: f64 = 0.001;
 
+/// What surrounds the strokes of a drawing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Style {
+    /// The page, mm in the drawing's frame; the ink with a margin of 1 mm if `None`.
+    pub page: Option<Rect>,
+    /// The pens' own colours.
+    pub colors: PenColors,
+}
+
 /// Writes the drawing. Strokes keep their order within each pen's layer; pens are in the order of their numbers.
 /// A dot is a path of no length with round ends, which shows as a dot. A drawing without ink is an empty page.
 ///
 /// # Errors
 /// Whatever the writer says.
-pub fn write<W: Write + ?Sized>(drawing: &Drawing, out: &mut W) -> io::Result<()> {
+pub fn write<W: Write + ?Sized>(drawing: &Drawing, style: &Style, out: &mut W) -> io::Result<()> {
     let mut text = Text::new(out);
-    let ink = drawing.bounding_box().unwrap_or(Rect::ZERO).inflate(MARGIN_MM, MARGIN_MM);
+    let ink = || drawing.bounding_box().unwrap_or(Rect::ZERO).inflate(MARGIN_MM, MARGIN_MM);
+    let page = style.page.unwrap_or_else(ink);
     text.str("<svg xmlns=\"http://www.w3.org/2000/svg\"");
     text.str(" xmlns:inkscape=\"http://www.inkscape.org/namespaces/inkscape\"");
-    view_box(&mut text, ink);
+    view_box(&mut text, page);
     text.str(" fill=\"none\" stroke-width=\"").fixed(LINE_MM);
     text.str("\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n");
     for pen in drawing.pens() {
@@ -36,7 +46,7 @@ pub fn write<W: Write + ?Sized>(drawing: &Drawing, out: &mut W) -> io::Result<()
             .int(pen.0)
             .str("\" inkscape:groupmode=\"layer\" inkscape:label=\"pen ")
             .int(pen.0);
-        text.str("\" stroke=\"").str(&hex(pen_colour(pen.0))).str("\">\n");
+        text.str("\" stroke=\"").str(&hex(pen_colour(pen.0, &style.colors))).str("\">\n");
         for stroke in drawing.strokes.iter().filter(|stroke| stroke.pen == pen) {
             text.str("<path d=\"");
             path(&mut text, stroke)?;

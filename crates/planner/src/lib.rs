@@ -65,7 +65,7 @@ mod trajectory;
 mod travel;
 
 pub use error::PlanError;
-pub use placement::{Mirror, PlacementOptions, Scale, beyond_sheet_mm, place};
+pub use placement::{Mirror, PlacementOptions, Scale, Surface, beyond_sheet_mm, place};
 pub use settings::{Settings, TimingLaw};
 pub use time_parametrization::{Easing, LimitingConstraints};
 pub use trajectory::{ExactRow, Rows, Times, Trajectory, check_reach, plan};

@@ -1,9 +1,50 @@
-//! Placement of a drawing on the machine.
+//! Placement of a drawing on a sheet, within a machine's reach where there is one.
 
 use drawing::{Affine, Drawing, Point, Rect, Segment, Vec2};
 use kinematics::Machine;
 
 use crate::error::PlanError;
+
+/// What a drawing is placed on: a machine with its sheet and reach, or a bare sheet ([`Rect`], mm).
+pub trait Surface {
+    /// The sheet, mm. Edges may be infinite.
+    fn sheet(&self) -> Rect;
+
+    /// Whether the pen reaches a point, mm.
+    fn reaches(&self, point: Point) -> bool;
+
+    /// A point of the segment that the pen does not reach, mm.
+    fn unreachable_point(&self, segment: &Segment) -> Option<Point>;
+}
+
+impl Surface for Machine {
+    fn sheet(&self) -> Rect {
+        Machine::sheet(self)
+    }
+
+    fn reaches(&self, point: Point) -> bool {
+        self.check_point(point).is_ok()
+    }
+
+    fn unreachable_point(&self, segment: &Segment) -> Option<Point> {
+        self.check_segment(segment).err().map(|outside| outside.point)
+    }
+}
+
+/// A sheet without a machine: the pen reaches every point.
+impl Surface for Rect {
+    fn sheet(&self) -> Rect {
+        *self
+    }
+
+    fn reaches(&self, _point: Point) -> bool {
+        true
+    }
+
+    fn unreachable_point(&self, _segment: &Segment) -> Option<Point> {
+        None
+    }
+}
 
 /// Where and how large to place a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +108,7 @@ impl Default for PlacementOptions {
     }
 }
 
-/// The map from drawing mm to machine mm.
+/// The map from drawing mm to mm of the surface: machine mm for a machine.
 ///
 /// An explicit placement is not checked against the sheet and the reach; see
 /// [`crate::check_reach`] and [`beyond_sheet_mm`].
@@ -75,13 +116,17 @@ impl Default for PlacementOptions {
 /// # Errors
 /// [`PlanError::NoInk`] for an empty drawing, [`PlanError::Setting`] if a number is not finite or
 /// the scale is not positive, [`PlanError::NoPlacement`] if no size fits.
-pub fn place(machine: &Machine, drawing: &Drawing, options: &PlacementOptions) -> Result<Affine, PlanError> {
+pub fn place(
+    surface: &dyn Surface,
+    drawing: &Drawing,
+    options: &PlacementOptions,
+) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
     let setting = |what: &'static str| PlanError::Setting { what };
     if !options.rotate_rad.is_finite() {
         return Err(setting("the rotation must be a finite angle"));
     }
-    let sheet = machine.sheet();
+    let sheet = surface.sheet();
     let margin = options.margin_mm;
     let inside = sheet.inset(-margin);
     // Sheets may be unbounded: a margin only matters where an edge is finite.
@@ -114,7 +159,7 @@ pub fn place(machine: &Machine, drawing: &Drawing, options: &PlacementOptions) -
             let mut rotated = drawing.clone();
             rotated.transform(rotation);
             let largest = if options.scale == Scale::Fit { f64::INFINITY } else { 1.0 };
-            Ok(fit(machine, inside, &rotated, largest)? * rotation)
+            Ok(fit(surface, inside, &rotated, largest)? * rotation)
         }
     }
 }
@@ -159,9 +204,9 @@ const PRECISION: f64 = 1e-4;
 /// sample of the ink. The exact check of every segment then either accepts the placement or returns a
 /// violating point, which is added to the sample, and the search continues. Deterministic: ties are
 /// broken by the order of the grid.
-fn fit(machine: &Machine, sheet: Rect, drawing: &Drawing, most: f64) -> Result<Affine, PlanError> {
+fn fit(surface: &dyn Surface, sheet: Rect, drawing: &Drawing, most: f64) -> Result<Affine, PlanError> {
     let bounds = drawing.bounding_box().ok_or(PlanError::NoInk)?;
-    let mut search = Search { machine, sheet, bounds, points: sample(drawing, bounds) };
+    let mut search = Search { surface, sheet, bounds, points: sample(drawing, bounds) };
     let across = if bounds.width() > 0.0 { sheet.width() / bounds.width() } else { f64::INFINITY };
     let up = if bounds.height() > 0.0 { sheet.height() / bounds.height() } else { f64::INFINITY };
     let largest = across.min(up).min(most);
@@ -171,7 +216,7 @@ fn fit(machine: &Machine, sheet: Rect, drawing: &Drawing, most: f64) -> Result<A
     for round in 0..200 {
         let Some((scale, shift)) = search.largest(high) else { break };
         let placement = Affine::translate(shift) * Affine::scale(scale);
-        match first_violation(machine, sheet, drawing, placement) {
+        match first_violation(surface, sheet, drawing, placement) {
             None => return Ok(placement),
             Some(offending) => {
                 search.points.insert(0, placement.inverse() * offending);
@@ -184,7 +229,7 @@ fn fit(machine: &Machine, sheet: Rect, drawing: &Drawing, most: f64) -> Result<A
 }
 
 struct Search<'a> {
-    machine: &'a Machine,
+    surface: &'a dyn Surface,
     sheet: Rect,
     bounds: Rect,
     /// The sample. A point that rules out a translation moves to the front, since it is likely to rule
@@ -247,7 +292,7 @@ impl Search<'_> {
     fn fits(&mut self, scale: f64, shift: Vec2) -> bool {
         let offending = self.points.iter().position(|point| {
             let at = (scale * point.to_vec2() + shift).to_point();
-            !on_sheet(self.sheet, at) || self.machine.check_point(at).is_err()
+            !on_sheet(self.sheet, at) || !self.surface.reaches(at)
         });
         if let Some(index) = offending {
             let point = self.points.remove(index);
@@ -302,7 +347,12 @@ fn sample(drawing: &Drawing, bounds: Rect) -> Vec<Point> {
 }
 
 /// The first point of the placed drawing that is off the sheet or out of reach, machine mm.
-fn first_violation(machine: &Machine, sheet: Rect, drawing: &Drawing, placement: Affine) -> Option<Point> {
+fn first_violation(
+    surface: &dyn Surface,
+    sheet: Rect,
+    drawing: &Drawing,
+    placement: Affine,
+) -> Option<Point> {
     let fault = |segment: &Segment| {
         let mut outside = None;
         // The sheet is convex, so for a line its end is sufficient.
@@ -311,19 +361,19 @@ fn first_violation(machine: &Machine, sheet: Rect, drawing: &Drawing, placement:
                 outside = Some(point);
             }
         });
-        outside.or_else(|| machine.check_segment(segment).err().map(|out| out.point))
+        outside.or_else(|| surface.unreachable_point(segment))
     };
     drawing.strokes.iter().find_map(|stroke| {
         let start = placement * stroke.start();
-        let dot = (!on_sheet(sheet, start) || machine.check_point(start).is_err()).then_some(start);
+        let dot = (!on_sheet(sheet, start) || !surface.reaches(start)).then_some(start);
         dot.or_else(|| stroke.segments().find_map(|segment| fault(&segment.transformed(placement))))
     })
 }
 
 /// The largest distance of ink outside the sheet, mm; 0 if all of it lies on the sheet. `placed` is
-/// in machine mm.
-pub fn beyond_sheet_mm(machine: &Machine, placed: &Drawing) -> f64 {
-    let sheet = machine.sheet();
+/// in mm of the surface.
+pub fn beyond_sheet_mm(surface: &dyn Surface, placed: &Drawing) -> f64 {
+    let sheet = surface.sheet();
     placed.bounding_box().map_or(0.0, |ink| {
         [sheet.x0 - ink.x0, ink.x1 - sheet.x1, sheet.y0 - ink.y0, ink.y1 - sheet.y1]
             .into_iter()

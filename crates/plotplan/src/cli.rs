@@ -8,6 +8,7 @@ use clap::builder::PossibleValue;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use compiler::layout::{Copies, Crop};
 use compiler::{import, quantity};
 
 /// Compiles pen-plotter drawings (HPGL, HP-GL/2, SVG) to motor motion.
@@ -52,14 +53,20 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
-    /// Drawing to read; `-` for standard input
-    pub(crate) file: String,
+    /// Drawings to read; `-` for standard input. Several are drawn over each other in one frame, or converted one by one
+    /// if --output is a folder
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<String>,
     /// Machine: a preset's name (see `plotplan machine list`) or a machine file
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
-    /// Where to write; `-` for standard output
+    /// Where to write; `-` for standard output. A folder takes one file for each drawing. In a name, `%f` stands for the
+    /// drawing's name without extension, `%p` for the page (or the pen, with --split pens only), `%n` for the pen
     #[arg(short, long, value_name = "OUT", default_value = "-")]
     pub(crate) output: String,
+    /// Write one file for each pen
+    #[arg(long, value_enum)]
+    pub(crate) split: Option<Split>,
     /// Output format; `hpgl` and `svg` write the normalized drawing and need no machine [default: by the extension of
     /// --output, else ticks]
     #[arg(short, long, value_enum)]
@@ -90,6 +97,13 @@ impl Convert {
             (Some(format), _) => Ok(format),
         }
     }
+}
+
+/// What each file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Split {
+    /// The strokes of one pen
+    Pens,
 }
 
 /// How firmware formats move the pen.
@@ -126,9 +140,9 @@ impl PenLift {
 /// How a drawing's file is read.
 #[derive(Debug, Args)]
 pub(crate) struct Reading {
-    /// Which page of the file to take, from 1
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) page: usize,
+    /// Which page of the file to take, from 1; with `convert`, `all` writes one file for each page
+    #[arg(long, value_name = "N|all", default_value = "1", value_parser = page)]
+    pub(crate) page: PageChoice,
     /// Plotter that the file was made for (see `plotplan explain plotters`) [default: from the file]
     #[arg(long, value_name = "NAME")]
     pub(crate) plotter: Option<String>,
@@ -147,12 +161,55 @@ pub(crate) struct Reading {
     /// SVG: pixels per inch; 96, or 72 for old files of Illustrator, if not given
     #[arg(long, value_name = "NUMBER", value_parser = dpi)]
     pub(crate) dpi: Option<f64>,
+    #[command(flatten)]
+    pub(crate) layout: Layout,
     /// How to write diagnostics to standard error
     #[arg(long, value_enum, default_value_t = MessageFormat::Human)]
     pub(crate) message_format: MessageFormat,
     /// Treat warnings as errors
     #[arg(long)]
     pub(crate) strict: bool,
+}
+
+/// A page of a drawing's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PageChoice {
+    /// The page of this number, from 1.
+    Number(usize),
+    /// All pages, each on its own.
+    All,
+}
+
+/// What is drawn of a drawing.
+#[derive(Debug, Args)]
+pub(crate) struct Layout {
+    /// Draw only these pens, by their numbers in the file
+    #[arg(long, value_name = "PEN,PEN,...", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) only_pens: Option<Vec<u16>>,
+    /// Renumber pens: the file's pen OLD becomes pen NEW
+    #[arg(long, value_name = "OLD=NEW,...", value_delimiter = ',', value_parser = pen_pair)]
+    pub(crate) pen_map: Vec<(u16, u16)>,
+    /// Repeat the drawing in a grid of COLUMNSxROWS
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = grid)]
+    pub(crate) copies: Option<(u16, u16)>,
+    /// Distance between the copies
+    #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = length, allow_negative_numbers = true)]
+    pub(crate) gap: f64,
+    /// Cut the placed drawing at the edges of the sheet, or of a window X,Y,W,H from the sheet's lower-left corner
+    #[arg(long, value_name = "sheet|X,Y,W,H", value_parser = crop, allow_hyphen_values = true)]
+    pub(crate) crop: Option<Crop>,
+}
+
+impl Layout {
+    /// The same for the compiler.
+    pub(crate) fn to_layout(&self) -> compiler::layout::Layout {
+        compiler::layout::Layout {
+            only_pens: self.only_pens.clone(),
+            pen_map: self.pen_map.clone(),
+            copies: self.copies.map(|(columns, rows)| Copies { columns, rows, gap_mm: self.gap }),
+            crop: self.crop,
+        }
+    }
 }
 
 impl Reading {
@@ -208,9 +265,9 @@ pub(crate) struct Planning {
     /// Time between rows [default: the machine's]
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub(crate) period: Option<f64>,
-    /// Order of the strokes
-    #[arg(long, value_enum, default_value_t = Order::Optimize)]
-    pub(crate) order: Order,
+    /// Order of the strokes [default: optimize; for --format hpgl and svg: file]
+    #[arg(long, value_enum)]
+    pub(crate) order: Option<Order>,
     /// Ordering effort, from 0 to 3
     #[arg(long, value_name = "LEVEL", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
     pub(crate) effort: u8,
@@ -310,9 +367,9 @@ pub(crate) struct Info {
 pub(crate) struct Verify {
     /// Plan to verify; `-` for standard input
     pub(crate) plan: String,
-    /// The drawing it should draw; without it only motion is verified
+    /// The drawing it should draw; without it only motion is verified. Give it once for each of several drawings
     #[arg(short, long, value_name = "FILE")]
-    pub(crate) drawing: Option<String>,
+    pub(crate) drawing: Vec<String>,
     /// Machine whose limits apply [default: of the plan document, else the preset the plan names]
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
@@ -328,8 +385,9 @@ pub(crate) struct Verify {
 
 #[derive(Debug, Args)]
 pub(crate) struct Preview {
-    /// Drawing or plan to read; `-` for standard input
-    pub(crate) file: String,
+    /// Plan, or drawings, which are drawn over each other; `-` for standard input
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<String>,
     /// Picture to write: NAME.svg or NAME.png
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: String,
@@ -599,7 +657,7 @@ pub(crate) enum ReportForm {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Order {
-    /// The least time with the pen up
+    /// The least time with the pen up; without a machine the least travel
     Optimize,
     /// As in the file
     File,
@@ -679,6 +737,45 @@ fn hatch(text: &str) -> Result<import::Hatch, String> {
     Ok(import::Hatch { spacing_mm, angle_rad: angle(direction)? })
 }
 
+fn page(text: &str) -> Result<PageChoice, String> {
+    match text {
+        "all" => Ok(PageChoice::All),
+        number => number
+            .parse()
+            .map(PageChoice::Number)
+            .map_err(|_| "expected the number of a page, or `all`".to_owned()),
+    }
+}
+
+fn pen_pair(text: &str) -> Result<(u16, u16), String> {
+    let what = "expected pairs of pens such as 2=1,4=2";
+    let (from, to) = text.split_once('=').ok_or(what)?;
+    let pen = |text: &str| text.trim().parse::<u16>().ok().filter(|pen| *pen > 0).ok_or(what);
+    Ok((pen(from)?, pen(to)?))
+}
+
+fn grid(text: &str) -> Result<(u16, u16), String> {
+    let what = "expected columns and rows such as 3x2, from 1 to 1000";
+    let (columns, rows) = text.split_once('x').ok_or(what)?;
+    let count =
+        |text: &str| text.trim().parse::<u16>().ok().filter(|n| (1..=1000).contains(n)).ok_or(what);
+    Ok((count(columns)?, count(rows)?))
+}
+
+fn crop(text: &str) -> Result<Crop, String> {
+    if text == "sheet" {
+        return Ok(Crop::Sheet);
+    }
+    let what = "expected `sheet`, or a window X,Y,WIDTH,HEIGHT such as 10mm,10mm,5cm,5cm";
+    let lengths: Vec<&str> = text.split(',').collect();
+    let [x, y, width, height] = lengths[..] else { return Err(what.to_owned()) };
+    let window = [length(x)?, length(y)?, length(width)?, length(height)?];
+    if !(window[2] > 0.0 && window[3] > 0.0) {
+        return Err("the width and height of the window must be positive".to_owned());
+    }
+    Ok(Crop::Window(window))
+}
+
 fn dpi(text: &str) -> Result<f64, String> {
     let dpi = text.trim().parse::<f64>().ok().filter(|dpi| (1.0..=100_000.0).contains(dpi));
     dpi.ok_or_else(|| format!("{text} is not a number from 1 to 100000"))
@@ -722,7 +819,7 @@ fn place(text: &str) -> Result<(f64, f64), String> {
 
 /// Options that choose files or the form of reports: the plan does not depend on them.
 const NOT_OF_THE_PLAN: [&str; 7] =
-    ["file", "machine", "output", "format", "report", "message_format", "strict"];
+    ["files", "machine", "output", "format", "report", "message_format", "strict"];
 
 /// The options of `convert` that shape the plan, as given, in the order of the help: with them, the
 /// same drawing and the same machine, `convert` makes the same plan.

@@ -12,6 +12,7 @@ mod verify;
 
 use clap::CommandFactory as _;
 use compiler::import::{self, Page, PenSettings};
+use compiler::layout::Crop;
 use compiler::pipeline::{Order, Request};
 use drawing::{Pen, Vec2};
 use kinematics::Machine;
@@ -68,17 +69,7 @@ fn manual(command: Option<&str>) -> Result<(), Failure> {
 }
 
 /// The request that the options ask for, for this page on this machine.
-fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
-    let order = match planning.order {
-        cli::Order::File => Order::File,
-        cli::Order::Optimize => Order::Optimize(ordering::Options {
-            effort: planning.effort,
-            dedupe: planning.dedupe,
-            keep_direction: planning.keep_direction,
-            pen_order: planning.pen_order.as_ref().map(|pens| pens.iter().copied().map(Pen).collect()),
-            ..ordering::Options::default()
-        }),
-    };
+fn request(planning: &Planning, crop: Option<Crop>, page: &Page, machine: &Machine) -> Request {
     let pen_speeds = match planning.speed {
         cli::Speed::Machine => Vec::new(),
         cli::Speed::File => {
@@ -90,13 +81,28 @@ fn request(planning: &Planning, page: &Page, machine: &Machine) -> Request {
     Request {
         tolerance_mm: planning.tolerance,
         period_us: (period * 1e6).round().max(0.0) as u64,
-        order,
+        order: order(planning),
+        crop,
         placement: placement(&planning.placement),
         pen_speeds,
         // The pen is off the paper long before it is all the way up.
         lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
         timing_law: timing_law(planning),
         allow_over_limit: planning.allow_over_limit,
+    }
+}
+
+/// The order that the options ask for.
+fn order(planning: &Planning) -> Order {
+    match planning.order.unwrap_or(cli::Order::Optimize) {
+        cli::Order::File => Order::File,
+        cli::Order::Optimize => Order::Optimize(ordering::Options {
+            effort: planning.effort,
+            dedupe: planning.dedupe,
+            keep_direction: planning.keep_direction,
+            pen_order: planning.pen_order.as_ref().map(|pens| pens.iter().copied().map(Pen).collect()),
+            ..ordering::Options::default()
+        }),
     }
 }
 

@@ -36,6 +36,18 @@ impl Failure {
         ExitCode::from(code)
     }
 
+    /// Reports the failure of one of several outputs, which does not end the command.
+    pub(crate) fn describe(self, name: &str) {
+        match self {
+            Self::ClosedPipe | Self::Refused | Self::Interrupted => {}
+            Self::Drawing(error) | Self::Usage(error) | Self::Io(error) => {
+                let text = format!("{error:#}");
+                let is_named = text.contains(name) || name.ends_with(text.split(':').next().unwrap_or(""));
+                terminal::error(&if is_named { text } else { format!("{name}: {text}") });
+            }
+        }
+    }
+
     /// A failure to write to `to`.
     pub(crate) fn writing(error: std::io::Error, to: &str) -> Self {
         if error.kind() == std::io::ErrorKind::BrokenPipe {

@@ -1,15 +1,18 @@
 //! Input files and standard input, and drawings read from them.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::Context as _;
 use compiler::import::{self, Document, ImportError, Page, Severity};
+use compiler::layout::{self, ColorConflict, Crop};
+use compiler::pipeline::Target;
 use compiler::report::text;
-use drawing::Drawing;
+use drawing::{Drawing, Span};
 
-use crate::cli;
+use crate::cli::{self, PageChoice};
 use crate::failure::Failure;
 use crate::terminal;
 
@@ -19,23 +22,44 @@ pub(crate) struct Input {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// Files read so far: an output never replaces one of them.
-static READ: Mutex<Vec<(String, same_file::Handle)>> = Mutex::new(Vec::new());
+/// What tells files apart, also through links.
+#[cfg(unix)]
+type FileId = (u64, u64);
+#[cfg(not(unix))]
+type FileId = std::path::PathBuf;
+
+/// Device and inode: an open handle for each of many files would use up the process's limit.
+#[cfg(unix)]
+fn file_id(path: &Path) -> Option<FileId> {
+    use std::os::unix::fs::MetadataExt as _;
+    std::fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
+}
+
+#[cfg(not(unix))]
+fn file_id(path: &Path) -> Option<FileId> {
+    std::fs::canonicalize(path).ok()
+}
+
+/// Input files with their names: an output never replaces one of them.
+static INPUTS: Mutex<BTreeMap<FileId, String>> = Mutex::new(BTreeMap::new());
 
 /// Reads a file's bytes, and remembers the file as an input.
 pub(crate) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
     let bytes = std::fs::read(path)?;
-    if let (Ok(handle), Ok(mut read)) = (same_file::Handle::from_path(path), READ.lock()) {
-        read.push((path.display().to_string(), handle));
-    }
+    remember(path);
     Ok(bytes)
 }
 
-/// The input that lies in the same file as `output`, by device and inode, also through links.
+/// Remembers a file as an input.
+pub(crate) fn remember(path: &Path) {
+    if let (Some(id), Ok(mut inputs)) = (file_id(path), INPUTS.lock()) {
+        inputs.entry(id).or_insert_with(|| path.display().to_string());
+    }
+}
+
+/// The input that lies in the same file as `output`, also through links.
 pub(crate) fn same_as(output: &Path) -> Option<String> {
-    let handle = same_file::Handle::from_path(output).ok()?;
-    let read = READ.lock().ok()?;
-    read.iter().find(|(_, input)| *input == handle).map(|(name, _)| name.clone())
+    INPUTS.lock().ok()?.get(&file_id(output)?).cloned()
 }
 
 /// Reads a file, or standard input for `-`.
@@ -56,6 +80,56 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
     Ok(Input { name, bytes })
 }
 
+/// The files of a drawing, one or several that are drawn over each other.
+pub(crate) struct Inputs(Vec<Input>);
+
+impl Inputs {
+    /// Reads the files.
+    pub(crate) fn read(files: &[String]) -> Result<Self, Failure> {
+        if files.iter().filter(|file| *file == "-").count() > 1 {
+            return Err(Failure::Usage(anyhow::anyhow!("standard input can be read once only")));
+        }
+        files.iter().map(|file| read(file)).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// The first file.
+    pub(crate) fn first(&self) -> &Input {
+        &self.0[0]
+    }
+
+    /// The only file; `None` for several.
+    pub(crate) fn single(&self) -> Option<&Input> {
+        if let [input] = &self.0[..] { Some(input) } else { None }
+    }
+
+    /// What to call the drawing: the files' names.
+    pub(crate) fn name(&self) -> String {
+        let names: Vec<&str> = self.0.iter().map(|input| &*input.name).collect();
+        names.join(" + ")
+    }
+
+    /// SHA-256 of the files' bytes, one after the other.
+    pub(crate) fn sha256(&self) -> String {
+        match &self.0[..] {
+            [input] => import::sha256(&input.bytes),
+            all => import::sha256(&all.iter().flat_map(|input| &input.bytes).copied().collect::<Vec<u8>>()),
+        }
+    }
+
+    /// The file in which a span of the whole drawing lies, and the span there.
+    pub(crate) fn locate(&self, span: Span) -> (&Input, Span) {
+        let mut offset = 0;
+        for input in &self.0[..self.0.len() - 1] {
+            if span.start < offset + input.bytes.len() {
+                return (input, Span { start: span.start - offset, end: span.end - offset });
+            }
+            offset += input.bytes.len();
+        }
+        let last = &self.0[self.0.len() - 1];
+        (last, Span { start: span.start.saturating_sub(offset), end: span.end.saturating_sub(offset) })
+    }
+}
+
 /// Why `--strict` refuses.
 pub(crate) const STRICT: &str = "stopping because of warnings (--strict)";
 
@@ -66,9 +140,17 @@ pub(crate) struct LoadedDrawing {
 }
 
 impl LoadedDrawing {
-    /// The page that was asked for.
+    /// The page that was asked for; the first one where all are.
     pub(crate) fn page(&self) -> &Page {
         &self.document.pages[self.page]
+    }
+
+    /// Cuts all pages where they lie, at a window of the drawing's own frame.
+    pub(crate) fn crop(&mut self, crop: Option<Crop>) {
+        let plane = Target::Plane.sheet();
+        for page in &mut self.document.pages {
+            page.drawing = layout::cropped(std::mem::take(&mut page.drawing), crop, plane);
+        }
     }
 
     /// Its drawing.
@@ -79,12 +161,67 @@ impl LoadedDrawing {
 
 /// Reads a drawing and prints its diagnostics. With `--strict` a warning stops here.
 pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedDrawing, Failure> {
+    let options = arguments.options();
+    let mut loaded = load(input, arguments, &options)?;
+    let layout = arguments.layout.to_layout();
+    for page in &mut loaded.document.pages {
+        layout.apply_pens(page);
+        layout.apply_copies(&mut page.drawing);
+    }
+    Ok(loaded)
+}
+
+/// Reads drawings, lays them over each other and prints their diagnostics. Options of one format
+/// apply to the files of that format.
+pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<LoadedDrawing, Failure> {
+    if let Some(input) = inputs.single() {
+        return drawing(input, arguments);
+    }
+    if arguments.page == PageChoice::All {
+        let what = "--page all takes one drawing, or a folder as --output";
+        return Err(Failure::Usage(anyhow::anyhow!(what)));
+    }
+    let layout = arguments.layout.to_layout();
+    let options = arguments.options();
+    let formats: Vec<&str> = inputs.0.iter().map(|input| import::format(&input.bytes)).collect();
+    let mut pages = Vec::new();
+    for (input, format) in inputs.0.iter().zip(&formats) {
+        let mut loaded = load(input, arguments, &options.for_format(format, &formats))?;
+        let mut page = loaded.document.pages.swap_remove(loaded.page);
+        layout.apply_pens(&mut page);
+        pages.push((page, input.bytes.len()));
+    }
+    let is_one = formats.iter().all(|format| *format == formats[0]);
+    let format = if is_one { formats[0] } else { "several formats" };
+    let (mut page, conflicts) = layout::overlay(pages);
+    for ColorConflict { pen, kept, lost, page } in conflicts {
+        let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
+        terminal::warning(&format!(
+            "pen {} is {} in {} but {} before: it keeps the first colour",
+            pen.0,
+            hex(lost),
+            inputs.0[page].name,
+            hex(kept)
+        ));
+    }
+    layout.apply_copies(&mut page.drawing);
+    let size = format!("{} files", inputs.0.len());
+    let document =
+        Document { format, pages: vec![page], diagnostics: Vec::new(), size, facts: Vec::new() };
+    Ok(LoadedDrawing { document, page: 0 })
+}
+
+/// Reads one file as it is, and prints its diagnostics.
+fn load(
+    input: &Input,
+    arguments: &cli::Reading,
+    options: &import::Options,
+) -> Result<LoadedDrawing, Failure> {
     if plan::file::is_plan(&input.bytes) {
         let what = format!("{} is a plan, not a drawing", input.name);
         return Err(Failure::Drawing(anyhow::anyhow!(what)));
     }
-    let options = arguments.options();
-    let document = import::read(&input.bytes, &options).map_err(|error| match error {
+    let document = import::read(&input.bytes, options).map_err(|error| match error {
         ImportError::Foreign { .. } => {
             Failure::Drawing(anyhow::Error::new(error).context(input.name.clone()))
         }
@@ -92,14 +229,43 @@ pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedD
     })?;
     terminal::diagnostics(input, &document.diagnostics, arguments.message_format);
     let pages = document.pages.len();
-    if arguments.page == 0 || arguments.page > pages {
+    let page = match arguments.page {
+        PageChoice::All => 1,
+        PageChoice::Number(number) => number,
+    };
+    if page == 0 || page > pages {
         let have = text::pluralize(pages, "page");
-        let what = format!("{} has {have}, not page {}", input.name, arguments.page);
+        let what = format!("{} has {have}, not page {page}", input.name);
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }
     if arguments.strict && document.has(Severity::Warning) {
         terminal::error(STRICT);
         return Err(Failure::Refused);
     }
-    Ok(LoadedDrawing { document, page: arguments.page - 1 })
+    check_pens(input, &document, arguments)?;
+    Ok(LoadedDrawing { document, page: page - 1 })
+}
+
+/// Reports pens of `--only-pens` and `--pen-map` that the drawing does not have. Refuses a selection
+/// that leaves nothing.
+fn check_pens(input: &Input, document: &Document, arguments: &cli::Reading) -> Result<(), Failure> {
+    let pens: BTreeSet<u16> =
+        document.pages.iter().flat_map(|page| page.drawing.pens()).map(|pen| pen.0).collect();
+    if pens.is_empty() {
+        return Ok(());
+    }
+    let list = |pens: &[u16]| pens.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
+    let have = || format!("{} draws with pens {}", input.name, list(&pens.iter().copied().collect::<Vec<_>>()));
+    let only = arguments.layout.only_pens.as_deref().unwrap_or_default();
+    if !only.is_empty() && !only.iter().any(|pen| pens.contains(pen)) {
+        let what = format!("--only-pens {} leaves nothing: {}", list(only), have());
+        return Err(Failure::Drawing(anyhow::anyhow!(what)));
+    }
+    let mapped = arguments.layout.pen_map.iter().map(|(from, _)| *from);
+    let missing: BTreeSet<u16> = only.iter().copied().chain(mapped).filter(|pen| !pens.contains(pen)).collect();
+    if !missing.is_empty() {
+        let missing: Vec<u16> = missing.into_iter().collect();
+        terminal::warning(&format!("no stroke has pen {}: {}", list(&missing), have()));
+    }
+    Ok(())
 }

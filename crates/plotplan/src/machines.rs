@@ -27,7 +27,12 @@ pub(crate) fn machine(name: &str) -> Result<LoadedMachine, Failure> {
 
 /// The machine that `--machine` names, with the sheet that `--paper` names.
 pub(crate) fn machine_with_paper(name: &str, reading: &cli::Reading) -> Result<LoadedMachine, Failure> {
-    let LoadedMachine { file, mut machine } = machine(name)?;
+    with_paper(machine(name)?, reading)
+}
+
+/// The machine with the sheet that `--paper` names.
+pub(crate) fn with_paper(machine: LoadedMachine, reading: &cli::Reading) -> Result<LoadedMachine, Failure> {
+    let LoadedMachine { file, mut machine } = machine;
     if let Some(paper) = reading.paper.as_ref().filter(|_| reading.plotter.is_none()) {
         let [width_mm, height_mm] =
             paper::size_mm(paper).map_err(|what| Failure::Usage(anyhow::anyhow!("--paper: {what}")))?;

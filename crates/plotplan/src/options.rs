@@ -20,25 +20,45 @@ const PLANNING: [&str; 12] = [
     "segment_time",
     "allow_over_limit",
 ];
+/// Options of planning that drawings have no use for: they hold no motion.
+const MOTION: [&str; 7] =
+    ["tolerance", "period", "speed", "overlap_lifts", "law", "segment_time", "allow_over_limit"];
 /// Options of placement.
 const PLACEMENT: [&str; 8] = ["fit", "shrink", "align", "place", "scale", "rotate", "mirror", "margin"];
+/// Options of placement that need a sheet.
+const ON_SHEET: [&str; 3] = ["fit", "shrink", "align"];
 /// Options of the ordering that `--order file` leaves out.
-const ORDERING: [&str; 4] = ["effort", "dedupe", "keep_direction", "pen_order"];
+const ORDERING: [&str; 3] = ["effort", "keep_direction", "pen_order"];
 /// Options of the firmware's pen.
 const PEN: [&str; 2] = ["pen_by", "pen_positions"];
 /// Options of the reader of a drawing.
-const READING: [&str; 7] = ["page", "plotter", "paper", "pens", "hatch", "outline_fills", "dpi"];
+const READING: [&str; 12] = [
+    "page",
+    "plotter",
+    "paper",
+    "pens",
+    "hatch",
+    "outline_fills",
+    "dpi",
+    "only_pens",
+    "pen_map",
+    "copies",
+    "gap",
+    "crop",
+];
 
 /// The first option given that has no effect, and why: `--scale has no effect with --format svg`.
 pub(crate) fn without_effect(matches: &ArgMatches) -> Option<String> {
     let (command, given) = matches.subcommand()?;
     let options = Given(given);
-    match command {
+    let of_command = match command {
         "convert" => convert(&options),
-        "check" | "info" | "preview" => drawing(command, &options),
+        "preview" => preview(&options),
+        "check" | "info" => drawing(&options),
         "verify" if !options.has("drawing") => options.refuse(&READING, "without --drawing"),
         _ => None,
-    }
+    };
+    of_command.or_else(|| options.refuse(&["gap"], "without --copies").filter(|_| !options.has("copies")))
 }
 
 /// The options of one command.
@@ -78,15 +98,19 @@ fn convert(options: &Given<'_>) -> Option<String> {
         given => given,
     };
     if format == "hpgl" || format == "svg" {
-        let why = format!("with --format {format}: it writes the drawing as it is");
-        let hpgl2 = options.refuse(&["hpgl2"], &why).filter(|_| format == "svg");
-        let paper = options.has_machine_paper().then(|| format!("--paper has no effect {why}"));
-        return hpgl2
-            .or_else(|| options.refuse(&["machine"], &why))
-            .or_else(|| options.refuse(&PLANNING, &why))
-            .or_else(|| options.refuse(&PLACEMENT, &why))
+        let why = format!("with --format {format}");
+        let no_motion = format!("{why}: it holds no motion");
+        return options
+            .refuse(&["hpgl2"], &why)
+            .filter(|_| format == "svg")
+            .or_else(|| options.refuse(&MOTION, &no_motion))
             .or_else(|| options.refuse(&PEN, &why))
-            .or(paper);
+            .or_else(|| {
+                let without = format!("{why} but with --order optimize");
+                options.refuse(&ORDERING, &without).filter(|_| options.text("order") != "optimize")
+            })
+            .or_else(|| sheet(options))
+            .or_else(|| margin(options));
     }
     let has_pen = format.starts_with("gcode") || format.starts_with("ebb");
     options
@@ -99,28 +123,50 @@ fn convert(options: &Given<'_>) -> Option<String> {
 fn planning(options: &Given<'_>) -> Option<String> {
     let law = options.text("law");
     let is_fixed_duration = ["linear", "sine", "quadratic"].contains(&law.as_str());
-    let has_margin = ["fit", "shrink", "align"].iter().any(|id| options.has(id));
     options
         .refuse(&["segment_time"], &format!("with --law {law}"))
         .filter(|_| !is_fixed_duration)
         .or_else(|| {
             options.refuse(&ORDERING, "with --order file").filter(|_| options.text("order") == "file")
         })
-        .or_else(|| options.refuse(&["margin"], "without --fit, --shrink or --align").filter(|_| !has_margin))
+        .or_else(|| margin(options))
 }
 
-fn drawing(command: &str, options: &Given<'_>) -> Option<String> {
-    if !options.has("machine") {
-        let why = "without --machine";
-        let paper = options.has_machine_paper().then(|| format!("--paper has no effect {why}"));
-        return options.refuse(&PLANNING, why).or_else(|| options.refuse(&PLACEMENT, why)).or(paper);
+/// `--margin` is for placements that look at the sheet's edges.
+fn margin(options: &Given<'_>) -> Option<String> {
+    let has_margin = ON_SHEET.iter().any(|id| options.has(id));
+    options.refuse(&["margin"], "without --fit, --shrink or --align").filter(|_| !has_margin)
+}
+
+/// Options that need a sheet, where no machine and no paper gives one.
+fn sheet(options: &Given<'_>) -> Option<String> {
+    if options.has("machine") || options.has_machine_paper() {
+        return None;
     }
-    if command == "preview" {
-        return options
-            .refuse(&PLANNING, "on a preview, which shows the file's order")
-            .or_else(|| planning(options));
+    let option = ON_SHEET.iter().find(|id| options.has(id)).copied();
+    let option = option.or_else(|| (options.text("crop") == "sheet").then_some("crop sheet"));
+    option.map(|option| format!("--{option} needs a sheet: give --paper or --machine"))
+}
+
+/// For `check` and `info`, which show the file's drawing where there is no machine.
+fn drawing(options: &Given<'_>) -> Option<String> {
+    if options.has("machine") {
+        return planning(options);
     }
-    planning(options)
+    let why = "without --machine";
+    let paper = options.has_machine_paper().then(|| format!("--paper has no effect {why}"));
+    options
+        .refuse(&PLANNING, why)
+        .or_else(|| options.refuse(&PLACEMENT, why))
+        .or(paper)
+        .or_else(|| sheet(options))
+}
+
+fn preview(options: &Given<'_>) -> Option<String> {
+    options
+        .refuse(&PLANNING, "on a preview, which shows the file's order")
+        .or_else(|| sheet(options))
+        .or_else(|| margin(options))
 }
 
 #[cfg(test)]
@@ -133,7 +179,7 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 27] = [
+    const VALUES: [(&str, Option<&str>); 33] = [
         ("--tolerance", Some("0.2mm")),
         ("--period", Some("20ms")),
         ("--order", Some("optimize")),
@@ -160,6 +206,12 @@ mod tests {
         ("--pen-positions", Some("1,2")),
         ("--page", Some("2")),
         ("--plotter", Some("hp7475a")),
+        ("--only-pens", Some("1,3")),
+        ("--pen-map", Some("2=1,4=2")),
+        ("--copies", Some("3x2")),
+        ("--gap", Some("5mm")),
+        ("--crop", Some("sheet")),
+        ("--split", Some("pens")),
         ("--machine", Some("corexy")),
     ];
 
@@ -195,12 +247,16 @@ mod tests {
         }
         row(&["plotplan", "convert", "x.hpgl", "--order", "file"]);
         row(&["plotplan", "convert", "x.hpgl", "--law", "sine"]);
+        row(&["plotplan", "convert", "x.hpgl", "--format", "hpgl", "--order", "optimize"]);
+        row(&["plotplan", "convert", "x.hpgl", "--format", "svg", "--paper", "a4", "--fit"]);
+        row(&["plotplan", "convert", "x.hpgl", "--format", "svg", "--machine", "corexy"]);
         for command in ["check", "info"] {
             row(&["plotplan", command, "x.hpgl"]);
             row(&["plotplan", command, "x.hpgl", "-mcorexy"]);
         }
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "-mcorexy"]);
+        row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "--paper", "a4"]);
         row(&["plotplan", "verify", "x.csv"]);
         row(&["plotplan", "verify", "x.csv", "-dx.hpgl"]);
         insta::assert_snapshot!(table);

@@ -1,5 +1,6 @@
 //! Standard error: diagnostics with an excerpt of the file, progress, reports.
 
+use std::cell::RefCell;
 use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
 
@@ -15,9 +16,28 @@ use crate::input::Input;
 /// Bytes shown on either side of a place: files of a single line of 10 MB are common.
 const WINDOW: usize = 48;
 
+thread_local! {
+    /// What this thread prints, while it is captured.
+    static CAPTURED: RefCell<Option<String>> = const { RefCell::new(None) };
+}
+
+/// Runs `work` and returns what it printed to standard error instead of printing it. Threads that
+/// `work` starts are not captured.
+pub(crate) fn captured<T>(work: impl FnOnce() -> T) -> (T, String) {
+    CAPTURED.with_borrow_mut(|text| *text = Some(String::new()));
+    let result = work();
+    (result, CAPTURED.take().unwrap_or_default())
+}
+
 /// Prints text to standard error, in colour where the terminal supports it. Ignores a closed
 /// standard error.
 pub(crate) fn say(text: &str) {
+    let is_captured = CAPTURED.with_borrow_mut(|captured| {
+        captured.as_mut().map(|captured| captured.push_str(text)).is_some()
+    });
+    if is_captured {
+        return;
+    }
     let mut out = anstream::AutoStream::auto(std::io::stderr());
     let _ = out.write_all(text.as_bytes());
     let _ = out.flush();
@@ -207,7 +227,8 @@ pub(crate) struct Progress {
 
 impl Progress {
     pub(crate) fn new() -> Self {
-        let bar = if std::io::stderr().is_terminal() {
+        let is_captured = CAPTURED.with_borrow(Option::is_some);
+        let bar = if std::io::stderr().is_terminal() && !is_captured {
             let bar = ProgressBar::new_spinner();
             if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
                 bar.set_style(style);

@@ -50,7 +50,8 @@ fn reader_options(options: &Options) -> Result<hpgl::Options, ImportError> {
 }
 
 fn pen_settings(settings: hpgl::PenSettings) -> PenSettings {
-    PenSettings { speed_mm_s: settings.speed_mm_s, width_mm: settings.width_mm, ..PenSettings::default() }
+    let hpgl::PenSettings { speed_mm_s, width_mm, color, .. } = settings;
+    PenSettings { speed_mm_s, width_mm, color, name: None }
 }
 
 fn diagnostic(found: hpgl::Diagnostic) -> Diagnostic {

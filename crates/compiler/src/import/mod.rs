@@ -108,6 +108,29 @@ pub fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     (importer.read)(bytes, options)
 }
 
+/// The name of the format that these bytes are read as.
+pub fn format(bytes: &[u8]) -> &'static str {
+    let importer = IMPORTERS.iter().find(|importer| (importer.recognizes)(bytes));
+    importer.unwrap_or(&hpgl::IMPORTER).name
+}
+
+impl Options {
+    /// The options for one of several files of these formats: those of another file's format are left
+    /// out. An option that is for none of the formats stays, so that [`read`] refuses it.
+    #[must_use]
+    pub fn for_format(&self, format: &str, formats: &[&str]) -> Self {
+        let mut options = self.clone();
+        if format != svg::IMPORTER.name && formats.contains(&svg::IMPORTER.name) {
+            options.svg = SvgOptions::default();
+        }
+        if format != hpgl::IMPORTER.name && formats.contains(&hpgl::IMPORTER.name) {
+            options.plotter = None;
+            options.paper = None;
+        }
+        options
+    }
+}
+
 /// The title, severity and explanation of a diagnostic's code, whichever importer reports it.
 pub fn explain(code: &str) -> Option<(String, &'static str)> {
     hpgl::explain(code).or_else(|| svg::explain(code))

@@ -92,6 +92,8 @@ pub(crate) struct Frame {
     hard_clip: Rect,
     /// Unless the file set a page, its edges do not clip; a page of one length is open towards y.
     page_clip: Option<Rect>,
+    /// Ink is cut off where the plotter's pen cannot go.
+    clips_at_limits: bool,
     page_set: bool,
     page_axes: PageAxes,
     /// `PS` set a page whose second length is the longer one.
@@ -127,6 +129,7 @@ impl Frame {
             default_hard_clip: options.hard_clip,
             hard_clip: options.hard_clip,
             page_clip: None,
+            clips_at_limits: options.clips_at_limits,
             page_set: false,
             page_axes,
             portrait_seen: false,
@@ -410,6 +413,11 @@ impl Frame {
         self.portrait_seen
     }
 
+    /// Whether the file set a page that ink is cut at.
+    pub(crate) fn has_page(&self) -> bool {
+        self.page_clip.is_some()
+    }
+
     /// Whether the file set a window.
     pub(crate) fn has_window(&self) -> bool {
         self.window.is_some()
@@ -451,7 +459,8 @@ impl Frame {
 
     /// The rectangle on the page that ink is clipped to, mm.
     pub(crate) fn clip(&self) -> Option<Rect> {
-        let page = self.page_clip.map(|page| self.turned(page));
+        let limits = self.clips_at_limits.then_some(self.hard_clip);
+        let page = self.page_clip.or(limits).map(|page| self.turned(page));
         let plu = match (self.window.map(|window| window.plu), page) {
             (None, None) => return None,
             (Some(one), None) | (None, Some(one)) => one,

@@ -130,6 +130,8 @@ impl Interpreter {
         let pieces = BASE_SEGMENT_BUDGET + SEGMENTS_PER_BYTE * length as u64;
         let frame = Frame::new(options, page_axes);
         let position_mm = frame.mm_of_plu(Point::ZERO);
+        let mut tracer = Tracer::new(pieces as f64, options.plotter_unit_mm, length);
+        tracer.set_clip(frame.clip());
         Self {
             frame,
             pen_selection: PenSelection::Default,
@@ -138,7 +140,7 @@ impl Interpreter {
             chords_by_deviation: false,
             position: Point::ZERO,
             position_mm,
-            tracer: Tracer::new(pieces as f64, options.plotter_unit_mm, length),
+            tracer,
             polygon: Polygon::default(),
             fill: FillType::default(),
             line_type: LineType::default(),
@@ -208,8 +210,10 @@ impl Interpreter {
         for _ in 0..self.tracer.take_clipped() {
             if self.frame.has_window() {
                 self.report(codes::CLIPPED, || "ink outside the window is cut off".into());
-            } else {
+            } else if self.frame.has_page() {
                 self.report(codes::CUT_AT_PAGE, || "ink outside the page that PS sets is cut off".into());
+            } else {
+                self.report(codes::CUT_AT_LIMITS, || "ink outside the plotter's limits is cut off".into());
             }
         }
     }

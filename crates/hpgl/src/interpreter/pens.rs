@@ -25,18 +25,37 @@ pub(crate) struct Pens {
     white_drawn: BTreeSet<Pen>,
 }
 
-/// The colours of pens, as far as they matter: which are white.
+/// The colours of pens that `PC` states.
 #[derive(Clone, Debug, PartialEq)]
 struct Palette {
-    /// Red, green and blue of white (`CR`).
+    /// Red, green and blue of black and of white (`CR`).
+    black: [f64; 3],
     white: [f64; 3],
     /// Pens that `PC` makes white.
     white_pens: BTreeSet<Pen>,
+    /// The colours of the others.
+    colors: BTreeMap<Pen, [u8; 3]>,
 }
 
 impl Default for Palette {
     fn default() -> Self {
-        Self { white: [255.0; 3], white_pens: BTreeSet::new() }
+        Self { black: [0.0; 3], white: [255.0; 3], white_pens: BTreeSet::new(), colors: BTreeMap::new() }
+    }
+}
+
+impl Palette {
+    /// A colour in steps of 1/255 between black and white.
+    fn color(&self, rgb: [f64; 3]) -> [u8; 3] {
+        std::array::from_fn(|at| {
+            let range = self.white[at] - self.black[at];
+            let part = if range == 0.0 { 0.0 } else { (rgb[at] - self.black[at]) / range };
+            (255.0 * part).round().clamp(0.0, 255.0) as u8
+        })
+    }
+
+    fn forget(&mut self, pen: Pen) {
+        self.white_pens.remove(&pen);
+        self.colors.remove(&pen);
     }
 }
 
@@ -60,6 +79,7 @@ impl Pens {
 
     fn note(&mut self, pen: Pen) {
         let now = self.single.get(&pen).copied().unwrap_or(self.all);
+        let now = PenSettings { color: self.palette.colors.get(&pen).copied(), ..now };
         self.used
             .entry(pen)
             .and_modify(|before| {
@@ -70,6 +90,7 @@ impl Pens {
                     force: least(before.force, now.force),
                     acceleration: least(before.acceleration, now.acceleration),
                     width_mm: now.width_mm.or(before.width_mm),
+                    color: now.color.or(before.color),
                 };
             })
             .or_insert(now);
@@ -136,23 +157,27 @@ impl Interpreter {
 
     /// `CR`: the values of red, green and blue that are black and white.
     pub(super) fn colour_range(&mut self, p: &[f64]) {
-        self.pens.palette.white = match *p {
-            [_, red, _, green, _, blue, ..] => [red, green, blue],
-            _ => Palette::default().white,
+        let palette = &mut self.pens.palette;
+        (palette.black, palette.white) = match *p {
+            [r0, r1, g0, g1, b0, b1, ..] => ([r0, g0, b0], [r1, g1, b1]),
+            _ => (Palette::default().black, Palette::default().white),
         };
     }
 
-    /// `PC`: a colour of the palette. It matters only whether it is white, the colour of the paper, as
-    /// that of pen 0 is by default.
+    /// `PC`: a colour of the palette. White is the colour of the paper, as that of pen 0 is by default.
     pub(super) fn pen_colour(&mut self, p: &[f64]) {
         let palette = &mut self.pens.palette;
         let white = palette.white;
         let is_white = |colour: &[f64]| colour.iter().zip(white).all(|(value, white)| *value >= white);
         match *p {
-            [] => palette.white_pens.clear(),
+            [] => {
+                palette.white_pens.clear();
+                palette.colors.clear();
+            }
             [pen, ..] if !(0.0..=f64::from(u16::MAX)).contains(&pen) => {}
             [0.0, red, green, blue, ..] => {
                 if !is_white(&[red, green, blue]) {
+                    palette.colors.insert(Pen(0), palette.color([red, green, blue]));
                     self.pens.zero_draws = true;
                     if self.pen_selection == PenSelection::Empty {
                         self.hold(0);
@@ -160,11 +185,14 @@ impl Interpreter {
                 }
             }
             [pen, red, green, blue, ..] if is_white(&[red, green, blue]) => {
+                palette.forget(Pen(pen as u16));
                 palette.white_pens.insert(Pen(pen as u16));
             }
-            [pen, ..] => {
-                palette.white_pens.remove(&Pen(pen as u16));
+            [pen, red, green, blue, ..] => {
+                palette.forget(Pen(pen as u16));
+                palette.colors.insert(Pen(pen as u16), palette.color([red, green, blue]));
             }
+            [pen, ..] => palette.forget(Pen(pen as u16)),
         }
         self.pens.touch();
     }

@@ -8,6 +8,7 @@ use compiler::report::text::{length, pluralize};
 
 use crate::cli::Check;
 use crate::failure::Failure;
+use crate::input::Inputs;
 use crate::machines;
 use crate::{input, output, terminal};
 
@@ -17,8 +18,12 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         .as_deref()
         .map(|name| machines::machine_with_paper(name, &arguments.reading))
         .transpose()?;
-    let input = input::read(&arguments.file)?;
-    let drawn = input::drawing(&input, &arguments.reading)?;
+    let inputs = Inputs::read(std::slice::from_ref(&arguments.file))?;
+    let input = inputs.first();
+    let mut drawn = input::drawing(input, &arguments.reading)?;
+    if machine.is_none() {
+        drawn.crop(arguments.reading.layout.crop);
+    }
     let document = &drawn.document;
     let mut refused = false;
     let mut text = format!("{}: {}\n", input.name, document.size);
@@ -50,8 +55,8 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     }
     if let Some(machine) = &machine {
         let drawing = drawn.drawing();
-        let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
-        match pipeline::place(drawing, &machine.machine, &request.placement) {
+        let request = super::request(&arguments.planning, arguments.reading.layout.crop, drawn.page(), &machine.machine);
+        match pipeline::place(drawing, &machine.machine, &request.placement, request.crop) {
             Ok(placed) => {
                 let _ = writeln!(text, "{} can draw it", machine.machine.name());
                 let beyond = placed.beyond_sheet_mm;
@@ -63,7 +68,7 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
                     }
                 }
             }
-            Err(error) => match super::convert::explain(&input, drawing, &machine.machine, &request, error) {
+            Err(error) => match super::convert::explain(&inputs, drawing, &machine.machine, &request, error) {
                 Failure::Refused => refused = true,
                 other => return Err(other),
             },

@@ -1,70 +1,158 @@
-//! `plotplan convert`: a drawing into a plan, or into a clean drawing.
+//! `plotplan convert`: drawings into plans, or into clean drawings.
+
+mod batch;
+pub(super) mod clean;
+mod names;
+
+use std::collections::BTreeSet;
 
 use annotate_snippets::Level;
 use backends::{Backend, PlanSource, RowIter, WriteError};
-use compiler::import;
+use compiler::import::Page;
+use compiler::layout::Layout;
 use compiler::pipeline::{self, Compiled, Order, Request};
 use compiler::report::{CertificateReport, Summary, text};
 use compiler::settings::Settings;
-use drawing::{Drawing, Vec2};
+use drawing::{Drawing, Pen, Vec2};
 use kinematics::Machine;
 use planner::{ExactRow, PlacementOptions, PlanError, Scale};
 use serde_json::json;
 
-use crate::cli::{Convert, Format, ReportForm};
+use self::names::{Names, Part};
+use crate::cli::{Convert, Format, PageChoice, Planning, ReportForm};
 use crate::failure::Failure;
-use crate::input::{self, Input, LoadedDrawing};
+use crate::input::{self, Inputs};
 use crate::machines::{self, LoadedMachine};
 use crate::output;
 use crate::terminal::{self, Progress};
+
+/// What every output of one command has in common.
+struct Job<'a> {
+    arguments: &'a Convert,
+    format: Format,
+    /// The options that shape the plan, as given.
+    command_line: &'a [String],
+    /// Always there for formats of plans.
+    machine: Option<&'a LoadedMachine>,
+}
+
+/// What was written.
+struct Written {
+    /// The report for standard error.
+    said: String,
+    /// The same in a few words.
+    line: String,
+}
 
 pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Failure> {
     // What is wrong with the machine shows before a long read.
     let format = arguments.format().map_err(|what| Failure::Usage(anyhow::anyhow!(what)))?;
     let machine = match (format, &arguments.machine) {
-        (Format::Hpgl | Format::Svg, _) => None,
+        (Format::Hpgl | Format::Svg, None) => None,
         (_, Some(name)) => Some(machines::machine_with_paper(name, &arguments.reading)?),
         (_, None) => {
             let what = "which machine is the plan for? Give --machine NAME (see `plotplan machine list`) or --machine FILE.toml";
             return Err(Failure::Usage(anyhow::anyhow!(what)));
         }
     };
-    let input = input::read(&arguments.file)?;
-    let drawn = input::drawing(&input, &arguments.reading)?;
-    if drawn.document.pages.len() > 1 {
-        let (page, pages) = (arguments.reading.page, drawn.document.pages.len());
-        terminal::warning(&format!(
-            "{} has {pages} pages; this is page {page}, --page takes another",
-            input.name
-        ));
+    let job = Job { arguments, format, command_line, machine: machine.as_ref() };
+    let names = Names::of(arguments, format);
+    if names.is_one_per_drawing() && arguments.files.len() > 1 {
+        return batch::run(&job, &names);
     }
-    match machine {
-        Some(machine) => plan(arguments, format, command_line, &input, &drawn, &machine),
-        None => write_drawing(arguments, format, drawn.drawing()),
+    if let Some(folder) = names.folder().filter(|_| names.is_one_per_drawing()) {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| Failure::writing(error, &folder.display().to_string()))?;
     }
+    let inputs = Inputs::read(&arguments.files)?;
+    for (_, written) in convert_parts(&job, &inputs, &names)? {
+        terminal::say(&written.said);
+    }
+    Ok(())
 }
 
-fn write_drawing(arguments: &Convert, format: Format, drawing: &Drawing) -> Result<(), Failure> {
-    let encoding =
-        if arguments.hpgl2 { hpgl::Encoding::Base64 } else { hpgl::EmitOptions::default().encoding };
-    let options = hpgl::EmitOptions { encoding, ..hpgl::EmitOptions::default() };
-    output::write(&arguments.output, |out| match format {
-        Format::Svg => picture::svg::write(drawing, out),
-        _ => out.write_all(&hpgl::emit(drawing, &options)),
-    })
+/// Converts a drawing, or each of its pages and pens: the outputs in order. If one of several fails
+/// the others are written.
+fn convert_parts(job: &Job<'_>, inputs: &Inputs, names: &Names) -> Result<Vec<(String, Written)>, Failure> {
+    let arguments = job.arguments;
+    let drawn = input::drawings(inputs, &arguments.reading)?;
+    let pages = drawn.document.pages.len();
+    let numbers = match arguments.reading.page {
+        PageChoice::All => 1..=pages,
+        PageChoice::Number(page) => {
+            if pages > 1 {
+                terminal::warning(&format!(
+                    "{} has {pages} pages; this is page {page}, --page takes another",
+                    inputs.name()
+                ));
+            }
+            page..=page
+        }
+    };
+    let name = inputs.name();
+    let mut parts = Vec::new();
+    for number in numbers {
+        let page = if inputs.single().is_some() { &drawn.document.pages[number - 1] } else { drawn.page() };
+        if arguments.split.is_none() {
+            parts.push((Part { drawing: &name, page: number, pen: None }, page.clone()));
+            continue;
+        }
+        for pen in page.drawing.pens() {
+            let mut page = page.clone();
+            page.drawing.strokes.retain(|stroke| stroke.pen == pen);
+            page.pens.retain(|other, _| *other == pen);
+            parts.push((Part { drawing: &name, page: number, pen: Some(pen.0) }, page));
+        }
+    }
+    let outputs: BTreeSet<String> = parts.iter().map(|(part, _)| names.file(*part)).collect();
+    if outputs.len() < parts.len() {
+        return Err(Failure::Usage(anyhow::anyhow!(names.lacks())));
+    }
+    let is_only = parts.len() == 1;
+    let mut written = Vec::new();
+    let mut failed = false;
+    for (part, mut page) in parts {
+        if arguments.planning.dedupe && order(&arguments.planning, job.format) == Order::File {
+            page.drawing = ordering::without_duplicates(page.drawing);
+        }
+        let to = names.file(part);
+        let result = match (job.format, job.machine) {
+            (Format::Hpgl | Format::Svg, _) | (_, None) => clean::write(job, inputs, &page, &to),
+            (_, Some(machine)) => plan(job, inputs, part, &page, machine, &to),
+        };
+        match result {
+            Ok(report) => written.push((to, report)),
+            Err(failure) if is_only => return Err(failure),
+            Err(failure) => {
+                failure.describe(&to);
+                failed = true;
+            }
+        }
+    }
+    if failed { Err(Failure::Refused) } else { Ok(written) }
+}
+
+/// The order in which strokes are drawn: in drawings the file's, unless another one is asked for, since
+/// other programs read them.
+fn order(planning: &Planning, format: Format) -> Order {
+    match (planning.order, format) {
+        (None, Format::Hpgl | Format::Svg) => Order::File,
+        _ => super::order(planning),
+    }
 }
 
 fn plan(
-    arguments: &Convert,
-    format: Format,
-    command_line: &[String],
-    input: &Input,
-    drawn: &LoadedDrawing,
+    job: &Job<'_>,
+    inputs: &Inputs,
+    part: Part<'_>,
+    page: &Page,
     machine: &LoadedMachine,
-) -> Result<(), Failure> {
-    let page = drawn.page();
-    let request = super::request(&arguments.planning, page, &machine.machine);
-    let compiled = compile(input, &page.drawing, &machine.machine, &request)?;
+    to: &str,
+) -> Result<Written, Failure> {
+    let Job { arguments, format, .. } = *job;
+    let crop = arguments.reading.layout.crop;
+    let request = super::request(&arguments.planning, crop, page, &machine.machine);
+    let compiled = compile(inputs, &page.drawing, &machine.machine, &request)?;
     if compiled.beyond_sheet_mm > 1e-6 {
         terminal::warning(&format!(
             "ink reaches {:.2} mm beyond the sheet (the machine can draw there); --fit keeps it on the sheet",
@@ -96,22 +184,25 @@ fn plan(
     if !compiled.certificate.holds {
         terminal::warning("the plan breaks the motors' limits, which was allowed");
     }
+    let time = text::duration(compiled.header.duration_us as f64 * 1e-6);
+    let ink = text::length(compiled.certificate.ink_mm);
+    let written = Written { said, line: format!("{time}, {ink} of ink") };
     if let Format::Backend(backend) = format {
-        write_encoded(arguments, backend, &machine.machine, &compiled)?;
-        terminal::say(&said);
-        return Ok(());
+        write_encoded(arguments, backend, &machine.machine, &compiled, to)?;
+        return Ok(written);
     }
     let reading = &arguments.reading;
-    let settings = Settings::of(&request, reading.page, &reading.options(), command_line.to_vec());
+    let (layout, command_line) = of_part(job, part);
+    let settings = Settings::of(&request, part.page, &reading.options(), &layout, command_line);
     let rows = || compiled.trajectory.rows().map(|row| row.row);
-    output::write(&arguments.output, |out| {
+    output::write(to, |out| {
         let written = match format {
             Format::Csv => plan::file::csv::write(&compiled.header, rows(), out),
             Format::Json => {
                 let document = plan::file::json::Document {
                     source: plan::file::json::Source {
-                        name: input.name.clone(),
-                        sha256: import::sha256(&input.bytes),
+                        name: inputs.name(),
+                        sha256: inputs.sha256(),
                     },
                     machine: serde_json::to_value(&machine.file)?,
                     settings: serde_json::to_value(&settings)?,
@@ -127,8 +218,28 @@ fn plan(
             other => std::io::Error::other(other),
         })
     })?;
-    terminal::say(&said);
-    Ok(())
+    Ok(written)
+}
+
+/// The layout and the options of `convert` that make the plan of this part alone.
+fn of_part(job: &Job<'_>, part: Part<'_>) -> (Layout, Vec<String>) {
+    let mut layout = job.arguments.reading.layout.to_layout();
+    let mut command_line = job.command_line.to_vec();
+    if job.arguments.reading.page == PageChoice::All {
+        command_line.retain(|option| !option.starts_with("--page="));
+        command_line.push(format!("--page={}", part.page));
+    }
+    if let Some(pen) = part.pen {
+        // The file's numbers of the pens that become this one.
+        let of_file = (1..=u16::MAX).filter(|from| layout.mapped(Pen(*from)) == Pen(pen));
+        let is_kept = |from: &u16| layout.only_pens.as_ref().is_none_or(|only| only.contains(from));
+        let only: Vec<u16> = of_file.filter(is_kept).collect();
+        let list = only.iter().map(u16::to_string).collect::<Vec<_>>().join(",");
+        command_line.retain(|option| !option.starts_with("--split=") && !option.starts_with("--only-pens="));
+        command_line.push(format!("--only-pens={list}"));
+        layout.only_pens = Some(only);
+    }
+    (layout, command_line)
 }
 
 /// Writes the plan in a firmware's format, and warns of what the format cannot carry.
@@ -137,6 +248,7 @@ fn write_encoded(
     backend: &dyn Backend,
     machine: &Machine,
     compiled: &Compiled<'_>,
+    to: &str,
 ) -> Result<(), Failure> {
     backend.check(machine).map_err(|error| Failure::Drawing(error.into()))?;
     let pens: Vec<u16> = compiled.ordered().pens().into_iter().map(|pen| pen.0).collect();
@@ -153,7 +265,7 @@ fn write_encoded(
     };
     let source = PlanSource::new(&compiled.header, &rows).on_machine(machine).of_drawing(compiled.ordered());
     let mut refused = None;
-    let written = output::write(&arguments.output, |out| {
+    let written = output::write(to, |out| {
         backend.write(&source, &arguments.pen.encode_options(), out).map_err(|error| match error {
             WriteError::Io(error) => error,
             other => {
@@ -173,7 +285,7 @@ fn write_encoded(
 
 /// Compiles with progress, and explains where it cannot be done.
 pub(super) fn compile<'a>(
-    input: &Input,
+    inputs: &Inputs,
     drawing: &Drawing,
     machine: &'a Machine,
     request: &Request,
@@ -181,25 +293,31 @@ pub(super) fn compile<'a>(
     let progress = Progress::new();
     let compiled = pipeline::compile(drawing, machine, request, &|step| progress.step(step));
     progress.finish();
-    compiled.map_err(|error| explain(input, drawing, machine, request, error))
+    compiled.map_err(|error| explain(inputs, drawing, machine, request, error))
+}
+
+/// The failure of a drawing that cannot be planned, for all reasons but a place on the drawing.
+pub(super) fn refusal(inputs: &Inputs, error: PlanError) -> Failure {
+    match error {
+        PlanError::Setting { .. } => Failure::Usage(error.into()),
+        other => Failure::Drawing(
+            anyhow::Error::new(other).context(format!("{} cannot be planned", inputs.name())),
+        ),
+    }
 }
 
 /// Says why a drawing cannot be planned, where, and what would help.
 pub(super) fn explain(
-    input: &Input,
+    inputs: &Inputs,
     drawing: &Drawing,
     machine: &Machine,
     request: &Request,
     error: PlanError,
 ) -> Failure {
     let PlanError::OutOfReach { stroke, pen, span, source } = &error else {
-        return match error {
-            PlanError::Setting { .. } => Failure::Usage(error.into()),
-            other => Failure::Drawing(
-                anyhow::Error::new(other).context(format!("{} cannot be planned", input.name)),
-            ),
-        };
+        return refusal(inputs, error);
     };
+    let (input, span) = inputs.locate(*span);
     let place_text = format!(
         "byte {}, stroke {} of {} in the file's order, pen {}; positions are in the machine's frame, the sheet is {:.2}, {:.2} to {:.2}, {:.2} mm",
         span.start,
@@ -213,7 +331,7 @@ pub(super) fn explain(
     );
     let help = what_fits(drawing, machine, request);
     let title = format!("the drawing leaves the reach of {}: {source}", machine.name());
-    terminal::at_place(input, *span, Level::ERROR, None, &title, &place_text, Some(&help));
+    terminal::at_place(input, span, Level::ERROR, None, &title, &place_text, Some(&help));
     Failure::Refused
 }
 
@@ -223,7 +341,7 @@ fn what_fits(drawing: &Drawing, machine: &Machine, request: &Request) -> String 
     const PLANNED_STROKES: usize = 2_000;
     let works = |scale: Scale| {
         let placement = PlacementOptions { scale, ..request.placement };
-        let placed = pipeline::place(drawing, machine, &placement).ok()?;
+        let placed = pipeline::place(drawing, machine, &placement, request.crop).ok()?;
         let planned = Request { placement, order: Order::File, ..request.clone() };
         let holds = drawing.strokes.len() > PLANNED_STROKES
             || pipeline::compile(drawing, machine, &planned, &|_| {}).is_ok();

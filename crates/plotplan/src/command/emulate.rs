@@ -173,5 +173,5 @@ fn scene(arguments: &Emulate, machine: Option<&LoadedMachine>, ink: &backends::I
     let sheet = machine.map(|machine| machine.machine.sheet()).or(bounds).unwrap_or(Rect::ZERO);
     let reach = machine.map_or_else(Vec::new, |machine| kinematics::reach_outlines(&machine.machine));
     let title = "what the machine drew".to_owned();
-    Scene { title, sheet, reach, ink, travel: Vec::new(), start: None }
+    Scene { title, sheet, reach, ink, colors: picture::PenColors::new(), travel: Vec::new(), start: None }
 }

@@ -9,7 +9,7 @@ use compiler::report::text::{self, duration, length, pluralize};
 
 use crate::cli::Info;
 use crate::failure::Failure;
-use crate::input::{self, Input};
+use crate::input::{self, Input, Inputs};
 use crate::machines;
 use crate::output;
 
@@ -17,22 +17,27 @@ use crate::output;
 const TOLERANCE_MM: f64 = 1.0;
 
 pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
-    let input = input::read(&arguments.file)?;
+    let inputs = Inputs::read(std::slice::from_ref(&arguments.file))?;
+    let input = inputs.first();
     let text = if plan::file::is_plan(&input.bytes) {
-        of_plan(&input, arguments.machine.as_deref())?
+        of_plan(input, arguments.machine.as_deref())?
     } else {
-        of_drawing(&input, arguments)?
+        of_drawing(&inputs, arguments)?
     };
     output::write("-", |out| out.write_all(text.as_bytes()))
 }
 
-fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
+fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<String, Failure> {
+    let input = inputs.first();
     let machine = arguments
         .machine
         .as_deref()
         .map(|name| machines::machine_with_paper(name, &arguments.reading))
         .transpose()?;
-    let drawn = input::drawing(input, &arguments.reading)?;
+    let mut drawn = input::drawing(input, &arguments.reading)?;
+    if machine.is_none() {
+        drawn.crop(arguments.reading.layout.crop);
+    }
     let document = &drawn.document;
     let mut text = format!("drawing  {}\n", input.name);
     for Fact { key, value } in &document.facts {
@@ -83,8 +88,8 @@ fn of_drawing(input: &Input, arguments: &Info) -> Result<String, Failure> {
     }
     text.push_str(&findings(&document.diagnostics));
     if let Some(machine) = machine {
-        let request = super::request(&arguments.planning, drawn.page(), &machine.machine);
-        let compiled = super::convert::compile(input, drawn.drawing(), &machine.machine, &request)?;
+        let request = super::request(&arguments.planning, arguments.reading.layout.crop, drawn.page(), &machine.machine);
+        let compiled = super::convert::compile(inputs, drawn.drawing(), &machine.machine, &request)?;
         text.push('\n');
         text.push_str(&text::summary(&machine.machine, &compiled));
         text.push_str(&text::certificate(&compiled.certificate));

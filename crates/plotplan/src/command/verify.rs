@@ -6,14 +6,14 @@
 use anyhow::Context as _;
 use compiler::machine_file::MachineFile;
 use compiler::report::{CertificateReport, text};
-use compiler::{import, replay};
+use compiler::{layout, replay};
 use drawing::Affine;
 use plan::file::PlanFile;
 use serde_json::json;
 
 use crate::cli::{ReportForm, Verify};
 use crate::failure::Failure;
-use crate::input::{self, Input};
+use crate::input::{self, Input, Inputs};
 use crate::machines::{self, LoadedMachine};
 use crate::{output, terminal};
 
@@ -21,22 +21,22 @@ use crate::{output, terminal};
 const DEFAULT_TOLERANCE_MM: f64 = 0.1;
 
 pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
-    if arguments.plan == "-" && arguments.drawing.as_deref() == Some("-") {
+    if arguments.plan == "-" && arguments.drawing.iter().any(|file| file == "-") {
         return Err(Failure::Usage(anyhow::anyhow!("plan and drawing cannot both be standard input")));
     }
     let input = input::read(&arguments.plan)?;
     let (plan, machine) = plan(&input, arguments.machine.as_deref())?;
+    let machine = machines::with_paper(machine, &arguments.reading)?;
     let mut mismatches: Vec<String> =
         verify::mismatches(&machine.machine, &plan.table.header).iter().map(ToString::to_string).collect();
-    let drawing = match &arguments.drawing {
-        None => None,
-        Some(file) => {
-            let input = input::read(file)?;
-            mismatches.extend(other_drawing(&plan, &input));
-            let mut drawing = input::drawing(&input, &arguments.reading)?.drawing().clone();
-            drawing.transform(Affine::new(plan.table.header.placement));
-            Some(drawing)
-        }
+    let drawing = if arguments.drawing.is_empty() {
+        None
+    } else {
+        let inputs = Inputs::read(&arguments.drawing)?;
+        mismatches.extend(other_drawing(&plan, &inputs));
+        let mut drawing = input::drawings(&inputs, &arguments.reading)?.drawing().clone();
+        drawing.transform(Affine::new(plan.table.header.placement));
+        Some(layout::cropped(drawing, arguments.reading.layout.crop, machine.machine.sheet()))
     };
     let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
@@ -63,13 +63,13 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
 }
 
 /// Reports a drawing that is not the one that the plan document names, by its SHA-256.
-fn other_drawing(plan: &PlanFile, drawing: &Input) -> Option<String> {
+fn other_drawing(plan: &PlanFile, drawing: &Inputs) -> Option<String> {
     let stated = &plan.document.as_ref()?.source.sha256;
-    let found = import::sha256(&drawing.bytes);
+    let found = drawing.sha256();
     (!stated.eq_ignore_ascii_case(&found)).then(|| {
         format!(
             "{} is not the drawing that the plan was made from: SHA-256 {found}, in the plan {stated}",
-            drawing.name
+            drawing.name()
         )
     })
 }

@@ -1,0 +1,246 @@
+//! What is drawn of a drawing, before it is placed: pens, several drawings in one, copies; and the
+//! crop after it is placed.
+
+use std::collections::BTreeMap;
+
+use drawing::{Affine, Drawing, Pen, Rect, Side, Span, Vec2};
+use serde::Serialize;
+
+use crate::import::{Page, PenSettings};
+
+/// How the drawing of a page is composed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Layout {
+    /// The pens that draw, by the file's numbers; all if `None`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub only_pens: Option<Vec<u16>>,
+    /// Pens with other numbers: the file's number and the new one. Others keep theirs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pen_map: Vec<(u16, u16)>,
+    /// A grid of copies; one copy if `None`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub copies: Option<Copies>,
+    /// What is kept of the placed drawing; all if `None`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub crop: Option<Crop>,
+}
+
+/// A grid of copies of a drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Copies {
+    /// Copies along x.
+    pub columns: u16,
+    /// Copies along y.
+    pub rows: u16,
+    /// Distance between the bounding boxes of neighbours, mm.
+    pub gap_mm: f64,
+}
+
+/// A window that a placed drawing is cut at.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Crop {
+    /// The sheet.
+    Sheet,
+    /// A window: lower-left corner from that of the sheet, width and height, mm.
+    Window([f64; 4]),
+}
+
+impl Crop {
+    /// The window on a sheet, in the sheet's frame, mm.
+    pub fn window(&self, sheet: Rect) -> Rect {
+        match *self {
+            Self::Sheet => sheet,
+            Self::Window([x, y, width, height]) => {
+                let corner = Vec2::new(sheet.x0 + x, sheet.y0 + y);
+                Rect::new(corner.x, corner.y, corner.x + width, corner.y + height)
+            }
+        }
+    }
+}
+
+/// The part of a placed drawing that the crop keeps; all of it without a crop.
+#[must_use]
+pub fn cropped(drawing: Drawing, crop: Option<Crop>, sheet: Rect) -> Drawing {
+    match crop {
+        None => drawing,
+        Some(crop) => drawing.clipped(crop.window(sheet), Side::Inside),
+    }
+}
+
+impl Layout {
+    /// Whether it changes nothing.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Selects and renumbers the pens of a page. Settings of pens that become one are those of the
+    /// lowest number, with the least speed of all.
+    pub fn apply_pens(&self, page: &mut Page) {
+        if let Some(only) = &self.only_pens {
+            page.drawing.strokes.retain(|stroke| only.contains(&stroke.pen.0));
+            page.pens.retain(|pen, _| only.contains(&pen.0));
+        }
+        if self.pen_map.is_empty() {
+            return;
+        }
+        for stroke in &mut page.drawing.strokes {
+            stroke.pen = self.mapped(stroke.pen);
+        }
+        let mut pens = BTreeMap::new();
+        for (pen, settings) in std::mem::take(&mut page.pens) {
+            add_settings(&mut pens, self.mapped(pen), settings);
+        }
+        page.pens = pens;
+    }
+
+    /// The number that a pen of the file gets.
+    pub fn mapped(&self, pen: Pen) -> Pen {
+        let found = self.pen_map.iter().find(|(from, _)| *from == pen.0);
+        found.map_or(pen, |&(_, to)| Pen(to))
+    }
+
+    /// Repeats the drawing in a grid, rows from the bottom up, each from left to right.
+    pub fn apply_copies(&self, drawing: &mut Drawing) {
+        let (Some(copies), Some(bounds)) = (self.copies, drawing.bounding_box()) else { return };
+        let pitch = Vec2::new(bounds.width() + copies.gap_mm, bounds.height() + copies.gap_mm);
+        let one = drawing.strokes.clone();
+        for row in 0..copies.rows {
+            for column in 0..copies.columns {
+                if (row, column) == (0, 0) {
+                    continue;
+                }
+                let shift = Vec2::new(pitch.x * f64::from(column), pitch.y * f64::from(row));
+                drawing.strokes.extend(one.iter().cloned().map(|mut stroke| {
+                    stroke.transform(Affine::translate(shift));
+                    stroke
+                }));
+            }
+        }
+    }
+}
+
+fn add_settings(pens: &mut BTreeMap<Pen, PenSettings>, pen: Pen, settings: PenSettings) {
+    let Some(known) = pens.get_mut(&pen) else {
+        pens.insert(pen, settings);
+        return;
+    };
+    known.speed_mm_s = known.speed_mm_s.into_iter().chain(settings.speed_mm_s).reduce(f64::min);
+    known.width_mm = known.width_mm.or(settings.width_mm);
+    known.name = known.name.take().or(settings.name);
+    known.color = known.color.or(settings.color);
+}
+
+/// A pen that has two colours in an overlay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ColorConflict {
+    /// The pen.
+    pub pen: Pen,
+    /// Its colour in the drawings before, which it keeps.
+    pub kept: [u8; 3],
+    /// Its colour in this drawing.
+    pub lost: [u8; 3],
+    /// Index of this drawing.
+    pub page: usize,
+}
+
+/// Draws pages over each other in one frame, the first one first.
+///
+/// Each page comes with the length of its source. Spans are those of the sources one after the
+/// other.
+pub fn overlay(pages: Vec<(Page, usize)>) -> (Page, Vec<ColorConflict>) {
+    let mut all = Page::default();
+    let mut conflicts = Vec::new();
+    let mut offset = 0;
+    for (index, (page, length)) in pages.into_iter().enumerate() {
+        all.drawing.strokes.extend(page.drawing.strokes.into_iter().map(|mut stroke| {
+            let Span { start, end } = stroke.source();
+            stroke.set_source(Span { start: start + offset, end: end + offset });
+            stroke
+        }));
+        for (pen, settings) in page.pens {
+            let known = all.pens.get(&pen).and_then(|known| known.color);
+            if let (Some(kept), Some(lost)) = (known, settings.color)
+                && kept != lost
+            {
+                conflicts.push(ColorConflict { pen, kept, lost, page: index });
+            }
+            add_settings(&mut all.pens, pen, settings);
+        }
+        offset += length;
+    }
+    (all, conflicts)
+}
+
+#[cfg(test)]
+mod tests {
+    use drawing::{Point, Stroke};
+
+    use super::*;
+
+    fn page(pens: &[u16]) -> Page {
+        let stroke = |&pen: &u16| {
+            let points = vec![Point::ZERO, Point::new(10.0, f64::from(pen))];
+            Stroke::polyline(Pen(pen), points, Span { start: 1, end: 2 }).unwrap()
+        };
+        let settings = |pen: u16| PenSettings {
+            color: Some([pen as u8, 0, 0]),
+            speed_mm_s: Some(f64::from(pen)),
+            ..PenSettings::default()
+        };
+        Page {
+            drawing: Drawing { strokes: pens.iter().map(stroke).collect() },
+            pens: pens.iter().map(|&pen| (Pen(pen), settings(pen))).collect(),
+        }
+    }
+
+    #[test]
+    fn pens_are_selected_by_the_files_numbers_and_swapped_at_once() {
+        let mut page = page(&[1, 2, 3, 4]);
+        let layout = Layout {
+            only_pens: Some(vec![1, 2, 4]),
+            pen_map: vec![(1, 2), (2, 1), (4, 1)],
+            ..Layout::default()
+        };
+        layout.apply_pens(&mut page);
+        let pens: Vec<u16> = page.drawing.strokes.iter().map(|stroke| stroke.pen.0).collect();
+        assert_eq!(pens, [2, 1, 1]);
+        // Pen 1 is the file's pens 2 and 4: colour of pen 2, speed of the slower one.
+        assert_eq!(page.pens[&Pen(1)].color, Some([2, 0, 0]));
+        assert_eq!(page.pens[&Pen(1)].speed_mm_s, Some(2.0));
+        assert_eq!(page.pens[&Pen(2)].color, Some([1, 0, 0]));
+    }
+
+    #[test]
+    fn copies_make_a_grid_with_gaps() {
+        let mut drawing = page(&[4]).drawing;
+        let one = drawing.length();
+        let copies = Some(Copies { columns: 3, rows: 2, gap_mm: 5.0 });
+        Layout { copies, ..Layout::default() }.apply_copies(&mut drawing);
+        assert_eq!(drawing.strokes.len(), 6);
+        assert!((drawing.length() - 6.0 * one).abs() < 1e-9);
+        assert_eq!(drawing.bounding_box(), Some(Rect::new(0.0, 0.0, 40.0, 13.0)));
+    }
+
+    #[test]
+    fn overlay_keeps_order_spans_and_the_first_colour() {
+        let mut red = page(&[1]);
+        red.pens.get_mut(&Pen(1)).unwrap().color = Some([255, 0, 0]);
+        let (all, conflicts) = overlay(vec![(page(&[1, 2]), 100), (red, 50), (page(&[3]), 10)]);
+        let starts: Vec<usize> = all.drawing.strokes.iter().map(|stroke| stroke.source().start).collect();
+        assert_eq!(starts, [1, 1, 101, 151]);
+        assert_eq!(conflicts, [ColorConflict { pen: Pen(1), kept: [1, 0, 0], lost: [255, 0, 0], page: 1 }]);
+        assert_eq!(all.pens[&Pen(1)].color, Some([1, 0, 0]));
+    }
+
+    #[test]
+    fn crop_windows_are_measured_from_the_sheets_corner() {
+        let sheet = Rect::new(-50.0, 10.0, 150.0, 110.0);
+        assert_eq!(Crop::Window([5.0, 5.0, 10.0, 20.0]).window(sheet), Rect::new(-45.0, 15.0, -35.0, 35.0));
+        assert_eq!(Crop::Sheet.window(sheet), sheet);
+        let drawing = page(&[1]).drawing;
+        let right = cropped(drawing.clone(), Some(Crop::Window([55.0, -20.0, 100.0, 100.0])), sheet);
+        assert!((right.length() - 0.5 * drawing.length()).abs() < 1e-9);
+        assert_eq!(cropped(drawing.clone(), None, sheet), drawing);
+    }
+}

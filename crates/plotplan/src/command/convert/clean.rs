@@ -1,0 +1,127 @@
+//! Drawings as output: clean HP-GL and SVG.
+
+use std::fmt::Write as _;
+
+use compiler::import::Page;
+use compiler::paper;
+use compiler::pipeline::{self, Arranged, Target};
+use compiler::report::text::{length, pluralize};
+use compiler::scene;
+use drawing::Rect;
+use kinematics::Machine;
+use serde_json::json;
+
+use super::{Job, Written};
+use crate::cli::{Format, Reading, ReportForm};
+use crate::command;
+use crate::failure::Failure;
+use crate::input::{self, Inputs};
+use crate::output;
+use crate::terminal;
+
+/// Places, crops and orders the drawing of a page, and writes it.
+pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Result<Written, Failure> {
+    let arguments = job.arguments;
+    let machine = job.machine.map(|loaded| &loaded.machine);
+    let target = target(machine, &arguments.reading)?;
+    let order = super::order(&arguments.planning, job.format);
+    let placement = command::placement(&arguments.planning.placement);
+    let crop = arguments.reading.layout.crop;
+    let arranged = pipeline::arrange(&page.drawing, target, &placement, crop, &order);
+    let arranged = arranged.map_err(|error| match machine {
+        Some(machine) => {
+            let request = command::request(&arguments.planning, crop, page, machine);
+            super::explain(inputs, &page.drawing, machine, &request, error)
+        }
+        None => super::refusal(inputs, error),
+    })?;
+    warn_beyond(&arranged, arguments.reading.strict)?;
+    output::write(to, |out| match job.format {
+        Format::Svg => {
+            let style = picture::svg::Style { page: page_rect(target), colors: scene::pen_colors(page) };
+            picture::svg::write(&arranged.drawing, &style, out)
+        }
+        _ => {
+            let mut options = hpgl::EmitOptions::default();
+            if arguments.hpgl2 {
+                options.encoding = hpgl::Encoding::Base64;
+                let colors = page.pens.iter().filter_map(|(pen, settings)| Some((*pen, settings.color?)));
+                options.colors = colors.collect();
+            }
+            out.write_all(&hpgl::emit(&arranged.drawing, &options))
+        }
+    })?;
+    let said = match (arguments.report, arranged.ordering) {
+        (ReportForm::Text, None) => String::new(),
+        (ReportForm::Text, Some(report)) => text_report(&report, machine.is_some()),
+        (ReportForm::Json, report) => json_report(&arranged, report),
+    };
+    let strokes = pluralize(arranged.drawing.strokes.len(), "stroke");
+    let line = format!("{strokes}, {} of ink", length(arranged.drawing.length()));
+    Ok(Written { said, line })
+}
+
+/// What drawings without a plan are arranged for.
+pub(in crate::command) fn target<'a>(
+    machine: Option<&'a Machine>,
+    reading: &Reading,
+) -> Result<Target<'a>, Failure> {
+    if let Some(machine) = machine {
+        return Ok(Target::Machine(machine));
+    }
+    match reading.paper.as_ref().filter(|_| reading.plotter.is_none()) {
+        None => Ok(Target::Plane),
+        Some(paper) => paper::size_mm(paper)
+            .map(Target::Sheet)
+            .map_err(|what| Failure::Usage(anyhow::anyhow!("--paper: {what}"))),
+    }
+}
+
+/// The sheet as a page with its lower-left corner at the origin, if it has edges.
+pub(in crate::command) fn page_rect(target: Target<'_>) -> Option<Rect> {
+    let size = target.sheet().size();
+    (size.width.is_finite() && size.height.is_finite()).then(|| Rect::from_origin_size((0.0, 0.0), size))
+}
+
+fn warn_beyond(arranged: &Arranged, strict: bool) -> Result<(), Failure> {
+    if arranged.beyond_sheet_mm <= 1e-6 {
+        return Ok(());
+    }
+    terminal::warning(&format!(
+        "ink reaches {:.2} mm beyond the sheet; --fit keeps it on the sheet, --crop sheet cuts it off",
+        arranged.beyond_sheet_mm
+    ));
+    if strict {
+        terminal::error(input::STRICT);
+        return Err(Failure::Refused);
+    }
+    Ok(())
+}
+
+fn text_report(report: &ordering::Report, by_time: bool) -> String {
+    let mut text = format!("strokes  {} of {}\n", report.strokes_after, report.strokes_before);
+    let _ = writeln!(
+        text,
+        "travel   {}, in the file's order {}",
+        length(report.travel_mm_after),
+        length(report.travel_mm_before)
+    );
+    if by_time {
+        let (after, before) = (report.travel_cost_after, report.travel_cost_before);
+        let _ = writeln!(text, "         {after:.1} s, in the file's order {before:.1} s");
+    }
+    text
+}
+
+fn json_report(arranged: &Arranged, report: Option<ordering::Report>) -> String {
+    let drawing = &arranged.drawing;
+    let summary = json!({
+        "strokes": drawing.strokes.len(),
+        "ink_mm": drawing.length(),
+        "pens": drawing.pens().iter().map(|pen| pen.0).collect::<Vec<_>>(),
+        "beyond_sheet_mm": arranged.beyond_sheet_mm,
+        "travel_mm": report.map(|report| report.travel_mm_after),
+        "travel_in_file_order_mm": report.map(|report| report.travel_mm_before),
+    });
+    format!("{}\n", json!({ "summary": summary }))
+}
