@@ -177,8 +177,8 @@ fn options_without_effect_are_refused() {
     let dir = TestDir::new();
     dir.write("a.hpgl", SQUARE);
     for command in [
-        "convert a.hpgl --format svg --fit",
-        "convert a.hpgl --format hpgl --scale 2",
+        "convert a.hpgl --format svg --law sine",
+        "convert a.hpgl --format hpgl --effort 3",
         "convert a.hpgl -m corexy --segment-time 2s",
         "convert a.hpgl -m corexy --hpgl2",
         "convert a.hpgl -m corexy --pen-by servo",

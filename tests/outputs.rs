@@ -55,10 +55,13 @@ fn hpgl_output_honours_placement_and_crop() {
         ("--mirror x", "240.0 mm of ink from 10.00, 10.00 to 80.00, 80.00"),
         ("--rotate 90 --scale 2", "480.0 mm of ink from 20.00, 20.00 to 160.00, 160.00"),
         ("--paper A4 --align top-right", "240.0 mm of ink from 140.00, 227.00 to 210.00, 297.00"),
-        ("--paper A4 --align top-right --margin 10mm", "240.0 mm of ink from 130.00, 217.00 to 200.00, 287.00"),
+        (
+            "--paper A4 --align top-right --margin 10mm",
+            "240.0 mm of ink from 130.00, 217.00 to 200.00, 287.00",
+        ),
         ("--paper 84x1000mm --fit --margin 7mm", "240.0 mm of ink from 7.00, 465.00 to 77.00, 535.00"),
         ("--paper 200x200 --shrink", "240.0 mm of ink from 65.00, 65.00 to 135.00, 135.00"),
-        ("--crop 20,10,100,100", "160.0 mm of ink from 20.00, 10.00 to 80.00, 80.00"),
+        ("--crop 20,10,100,100", "200.0 mm of ink from 20.00, 10.00 to 80.00, 80.00"),
         ("--paper 70x70 --crop sheet", "160.0 mm of ink from 10.00, 10.00 to 70.00, 70.00"),
         ("--machine corexy --place 1,1", "240.0 mm of ink from 11.00, 11.00 to 81.00, 81.00"),
     ] {
@@ -80,7 +83,11 @@ fn drawing_output_for_a_machine_plans_as_the_drawing_does() {
     succeed(&dir, &format!("convert a.hpgl {options} --order optimize -o placed.svg"));
     succeed(&dir, "convert placed.svg --machine coaxial --order file -o later.csv");
     let ticks = |file: &str| -> Vec<String> {
-        dir.text(file).lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())).map(str::to_owned).collect()
+        dir.text(file)
+            .lines()
+            .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+            .map(str::to_owned)
+            .collect()
     };
     let (direct, later) = (ticks("direct.csv"), ticks("later.csv"));
     let difference = direct.len().abs_diff(later.len());
@@ -92,10 +99,13 @@ fn svg_output_keeps_sheet_colours_and_arcs() {
     let dir = drawings();
     succeed(&dir, "convert b.svg -o out.svg --paper A3,landscape --crop 40,240,20,100");
     let svg = dir.text("out.svg");
-    assert!(svg.contains(r#"width="420mm" height="297mm" viewBox="0 -297 420 297""#), "{svg}");
+    assert!(
+        svg.contains(r#"width="420.000mm" height="297.000mm" viewBox="0.000 -297.000 420.000 297.000""#),
+        "{svg}"
+    );
     assert!(svg.contains(r##"inkscape:label="pen 4" stroke="#cc0000""##), "{svg}");
     let paths = svg.lines().filter(|line| line.starts_with("<path"));
-    assert!(paths.clone().count() == 1 && paths.clone().all(|path| path.contains("A20 20")), "{svg}");
+    assert!(paths.clone().count() == 1 && paths.clone().all(|path| path.contains("A20.000 20.000")), "{svg}");
     assert!(succeed(&dir, "info out.svg").contains("#cc0000"));
     for picture in ["p.svg --paper A4", "q.svg --machine corexy"] {
         succeed(&dir, &format!("preview b.svg -o {picture}"));
@@ -109,7 +119,10 @@ fn pens_are_selected_and_renumbered() {
     for (options, expected) in [
         ("--only-pens 2", "1 stroke, 80.0 mm of ink from 60.00, 10.00 to 80.00, 30.00 mm, pens 2"),
         ("--pen-map 2=5", "3 strokes, 240.0 mm of ink from 10.00, 10.00 to 80.00, 80.00 mm, pens 1, 5"),
-        ("--pen-map 1=2,2=1 --only-pens 1", "2 strokes, 160.0 mm of ink from 10.00, 10.00 to 40.00, 80.00 mm, pens 2"),
+        (
+            "--pen-map 1=2,2=1 --only-pens 1",
+            "2 strokes, 160.0 mm of ink from 10.00, 10.00 to 40.00, 80.00 mm, pens 2",
+        ),
     ] {
         let text = succeed(&dir, &format!("check a.hpgl {options}"));
         assert!(text.contains(expected), "{options}: {text}");
@@ -169,7 +182,11 @@ fn several_files_are_drawn_over_each_other() {
     assert!(found.starts_with("4 strokes, 365.7 mm of ink"), "{found}");
     assert!(found.ends_with("pens 1, 2, 4"), "{found}");
     succeed(&dir, "convert a.hpgl b.svg --hatch 2mm --copies 3x2 --gap 5mm -o grid.hpgl");
-    assert!(check(&dir, "grid.hpgl").starts_with("24 strokes, 2.194 m of ink"), "{}", check(&dir, "grid.hpgl"));
+    assert!(
+        check(&dir, "grid.hpgl").starts_with("24 strokes, 2.19 m of ink"),
+        "{}",
+        check(&dir, "grid.hpgl")
+    );
     assert!(fail(&dir, "convert a.hpgl a.hpgl --hatch 2mm -o x.hpgl", 2).contains("no effect"));
     succeed(&dir, "preview a.hpgl b.svg -o both.png");
     // A plan of two drawings names both, and verifies against both.
@@ -197,17 +214,21 @@ fn pages_and_pens_are_written_to_files_of_their_own() {
     let options = document["settings"]["command_line"].as_array().expect("a list");
     let options: Vec<&str> = options.iter().filter_map(|option| option.as_str()).collect();
     succeed(&dir, &format!("convert pages.hpgl -m corexy -o again.json {}", options.join(" ")));
-    let rows = |file: &str| serde_json::from_str::<serde_json::Value>(&dir.text(file)).expect("JSON")["rows"].clone();
+    let rows = |file: &str| {
+        serde_json::from_str::<serde_json::Value>(&dir.text(file)).expect("JSON")["rows"].clone()
+    };
     assert_eq!(rows("again.json"), rows("p2-n3.json"));
     assert!(fail(&dir, "convert pages.hpgl --page all -o one.hpgl", 2).contains("%p"));
-    assert!(fail(&dir, "convert a.hpgl --split pens", 2).contains("--split pens writes several files"));
+    assert!(
+        fail(&dir, "convert a.hpgl --split pens -o x.hpgl", 2).contains("--split pens writes several files")
+    );
 }
 
 #[test]
 fn folder_takes_a_file_for_each_drawing() {
     let dir = drawings();
     dir.write("c.pdf", "%PDF-1.4\n");
-    let message = fail(&dir, "convert a.hpgl b.svg c.pdf -o plans/ -m corexy", 1);
+    let message = fail(&dir, "convert a.hpgl b.svg c.pdf -o plans/ -m corexy --fit", 1);
     assert!(message.contains("a.hpgl -> plans/a.ticks: "), "{message}");
     assert!(message.contains("c.pdf: this is a PDF document"), "{message}");
     assert!(message.ends_with("2 of 3 drawings converted\n"), "{message}");
@@ -222,5 +243,7 @@ fn folder_takes_a_file_for_each_drawing() {
     let message = fail(&dir, "convert b.svg a.hpgl -o ./%f.hpgl", 1);
     assert!(message.contains("an output does not replace an input"), "{message}");
     assert_eq!(dir.text("a.hpgl"), SQUARES);
-    assert!(fail(&dir, "convert a.hpgl plans/a.hpgl -o plans/ --format svg", 2).contains("would both be written"));
+    assert!(
+        fail(&dir, "convert a.hpgl plans/a.hpgl -o plans/ --format svg", 2).contains("would both be written")
+    );
 }

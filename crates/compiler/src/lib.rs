@@ -22,6 +22,7 @@
 //!     placement: PlacementOptions::default(),
 //!     crop: None,
 //!     pen_speeds: Vec::new(),
+//!     pen_colors: std::collections::BTreeMap::new(),
 //!     lift_overlap_s: 0.0,
 //!     timing_law: TimingLaw::TimeOptimal,
 //!     allow_over_limit: false,

@@ -2,6 +2,8 @@
 //!
 //! Start reading at [`compile`].
 
+use std::collections::BTreeMap;
+
 use drawing::{Affine, Drawing, Pen, Point, Rect, Vec2};
 use kinematics::{JointPos, Machine};
 use plan::{Header, Limits, Motor};
@@ -46,6 +48,8 @@ pub struct Request {
     pub crop: Option<Crop>,
     /// Drawing speeds of single pens, mm/s; the machine's own limit still holds.
     pub pen_speeds: Vec<(Pen, f64)>,
+    /// Red, green and blue of pens, for the plan's header.
+    pub pen_colors: BTreeMap<u16, [u8; 3]>,
     /// Part of the lift time during which the motors may already travel, s.
     pub lift_overlap_s: f64,
     /// The time law along strokes.
@@ -303,6 +307,7 @@ pub fn compile<'a>(
         placement: placement.as_coeffs(),
         period_us: request.period_us,
         lift_overlap_us: (request.lift_overlap_s * 1e6).round() as u64,
+        pen_colors: request.pen_colors.clone(),
         rows: trajectory.row_count(),
         duration_us: trajectory.duration_us(),
     };

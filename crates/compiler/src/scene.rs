@@ -29,14 +29,14 @@ pub fn pen_colors(page: &Page) -> PenColors {
 }
 
 /// The rows of a plan on its machine.
-pub fn of_plan(title: &str, rows: &[Row], machine: &Machine) -> Scene {
+pub fn of_plan(title: &str, rows: &[Row], machine: &Machine, colors: PenColors) -> Scene {
     let Motion { ink, travel } = Motion::of(rows, machine, CHORD_MM);
     Scene {
         title: title.to_owned(),
         sheet: machine.sheet(),
         reach: reach_outlines(machine),
         ink: ink.into_iter().map(|Polyline { pen, points }| Ink { pen, points }).collect(),
-        colors: PenColors::new(),
+        colors,
         travel: travel.into_iter().map(|line| line.points).collect(),
         start: Some(start_point(machine)),
     }

@@ -43,6 +43,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         placement: PlacementOptions { scale, ..PlacementOptions::default() },
         crop: None,
         pen_speeds: Vec::new(),
+        pen_colors: std::collections::BTreeMap::new(),
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::default(),
         allow_over_limit: false,

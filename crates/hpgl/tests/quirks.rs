@@ -601,7 +601,8 @@ fn named_plotter_cuts_at_its_limits() {
     let a4 = Options::for_plotter("hp7475a", None).expect("built in");
     let unit = a4.plotter_unit_mm;
     let cut = read(file, &a4);
-    let lengths: Vec<f64> = cut.pages[0].drawing.strokes.iter().map(|stroke| stroke.length() / unit).collect();
+    let lengths: Vec<f64> =
+        cut.pages[0].drawing.strokes.iter().map(|stroke| stroke.length() / unit).collect();
     assert!((lengths[0] - 40.0).abs() < 1e-6 && (lengths[1] - 100.0).abs() < 1e-6, "{lengths:?}");
     assert!(cut.diagnostics.iter().any(|found| found.code.name() == "H0230"), "{:?}", cut.diagnostics);
     let whole = read(file, &Options::default());

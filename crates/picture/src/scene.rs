@@ -159,7 +159,9 @@ impl Legend {
                 left + 6.0 * self.size_mm * (index % self.pens_a_line) as f64,
                 line(3 + index / self.pens_a_line),
             );
-            text.str("<path stroke=\"").str(&hex(colour_on_white(pen, &scene.colors))).str("\" stroke-width=\"");
+            text.str("<path stroke=\"")
+                .str(&hex(colour_on_white(pen, &scene.colors)))
+                .str("\" stroke-width=\"");
             text.fixed(0.3 * self.size_mm).str("\" d=\"M");
             point(text, at + (0.0, 0.3 * self.size_mm));
             text.byte(b'h').fixed(1.2 * self.size_mm).str("\"/>\n");

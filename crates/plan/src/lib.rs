@@ -11,7 +11,8 @@
 //! let motors = ["arm1", "arm2"].map(|name| Motor { name: name.to_owned(), limits });
 //! let placement = [1.0, 0.0, 0.0, 1.0, 12.7, 76.2];
 //! let header =
-//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, lift_overlap_us: 0, rows: 2, duration_us: 10_000 };
+//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, lift_overlap_us: 0, rows: 2, duration_us: 10_000,
+//!         pen_colors: [(2, [204, 0, 0])].into() };
 //! let rows = [Row { t_us: 0, pen: 0, ticks: [800, 0] }, Row { t_us: 10_000, pen: 0, ticks: [801, -1] }];
 //!
 //! let mut bytes = Vec::new();
@@ -23,6 +24,8 @@
 //! ```
 
 pub mod file;
+
+use std::collections::BTreeMap;
 
 /// How many motors move the pen: as many as the plane has dimensions, since the coupling is invertible.
 pub const MOTORS: usize = 2;
@@ -73,6 +76,8 @@ pub struct Header {
     pub period_us: u64,
     /// For how much of the time that a lift takes the motors may already travel, in microseconds; mostly 0.
     pub lift_overlap_us: u64,
+    /// Red, green and blue of the pens whose colours the drawing states, by pen number.
+    pub pen_colors: BTreeMap<u16, [u8; 3]>,
     /// How many rows there are.
     pub rows: u64,
     /// Time of the last row, in microseconds.

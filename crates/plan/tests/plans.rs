@@ -1,5 +1,7 @@
 //! Every plan format, held to the same promises: what is written is read back, what is cut off is noticed, nothing panics.
 
+use std::collections::BTreeMap;
+
 use plan::file::{self, PlanFormat, ReadError, csv, is_plan, json, tick_lines};
 use plan::{Header, Limits, Motor, Row, TickTable};
 use proptest::prelude::*;
@@ -28,8 +30,9 @@ fn table() -> impl Strategy<Value = TickTable> {
     let rows = proptest::collection::vec(row, 1..60);
     let placement = proptest::array::uniform6(-1e4..1e4f64);
     let overlap = prop_oneof![Just(0u64), 1..1_000_000u64];
-    (rows, placement, limits(), limits(), 1..10_000_000u64, overlap).prop_map(
-        |(steps, placement, a, b, period_us, lift_overlap_us)| {
+    let colors = proptest::collection::btree_map(1..9u16, any::<[u8; 3]>(), 0..4);
+    (rows, placement, limits(), limits(), 1..10_000_000u64, overlap, colors).prop_map(
+        |(steps, placement, a, b, period_us, lift_overlap_us, pen_colors)| {
             let mut t_us = 0;
             let rows: Vec<Row> = steps
                 .into_iter()
@@ -46,6 +49,7 @@ fn table() -> impl Strategy<Value = TickTable> {
                 placement,
                 period_us,
                 lift_overlap_us,
+                pen_colors,
                 rows: rows.len() as u64,
                 duration_us: t_us,
             };
@@ -73,6 +77,7 @@ fn small() -> TickTable {
         placement: [1.0, 0.0, 0.0, 1.0, 12.7, 76.2],
         period_us: 10_000,
         lift_overlap_us: 0,
+        pen_colors: BTreeMap::new(),
         rows: rows.len() as u64,
         duration_us: 350_000,
     };

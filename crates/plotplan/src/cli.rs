@@ -757,8 +757,7 @@ fn pen_pair(text: &str) -> Result<(u16, u16), String> {
 fn grid(text: &str) -> Result<(u16, u16), String> {
     let what = "expected columns and rows such as 3x2, from 1 to 1000";
     let (columns, rows) = text.split_once('x').ok_or(what)?;
-    let count =
-        |text: &str| text.trim().parse::<u16>().ok().filter(|n| (1..=1000).contains(n)).ok_or(what);
+    let count = |text: &str| text.trim().parse::<u16>().ok().filter(|n| (1..=1000).contains(n)).ok_or(what);
     Ok((count(columns)?, count(rows)?))
 }
 

@@ -85,6 +85,7 @@ fn request(planning: &Planning, crop: Option<Crop>, page: &Page, machine: &Machi
         crop,
         placement: placement(&planning.placement),
         pen_speeds,
+        pen_colors: compiler::scene::pen_colors(page),
         // The pen is off the paper long before it is all the way up.
         lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
         timing_law: timing_law(planning),

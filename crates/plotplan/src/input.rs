@@ -206,8 +206,7 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     }
     layout.apply_copies(&mut page.drawing);
     let size = format!("{} files", inputs.0.len());
-    let document =
-        Document { format, pages: vec![page], diagnostics: Vec::new(), size, facts: Vec::new() };
+    let document = Document { format, pages: vec![page], diagnostics: Vec::new(), size, facts: Vec::new() };
     Ok(LoadedDrawing { document, page: 0 })
 }
 
@@ -255,14 +254,16 @@ fn check_pens(input: &Input, document: &Document, arguments: &cli::Reading) -> R
         return Ok(());
     }
     let list = |pens: &[u16]| pens.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
-    let have = || format!("{} draws with pens {}", input.name, list(&pens.iter().copied().collect::<Vec<_>>()));
+    let have =
+        || format!("{} draws with pens {}", input.name, list(&pens.iter().copied().collect::<Vec<_>>()));
     let only = arguments.layout.only_pens.as_deref().unwrap_or_default();
     if !only.is_empty() && !only.iter().any(|pen| pens.contains(pen)) {
         let what = format!("--only-pens {} leaves nothing: {}", list(only), have());
         return Err(Failure::Drawing(anyhow::anyhow!(what)));
     }
     let mapped = arguments.layout.pen_map.iter().map(|(from, _)| *from);
-    let missing: BTreeSet<u16> = only.iter().copied().chain(mapped).filter(|pen| !pens.contains(pen)).collect();
+    let missing: BTreeSet<u16> =
+        only.iter().copied().chain(mapped).filter(|pen| !pens.contains(pen)).collect();
     if !missing.is_empty() {
         let missing: Vec<u16> = missing.into_iter().collect();
         terminal::warning(&format!("no stroke has pen {}: {}", list(&missing), have()));

@@ -106,7 +106,7 @@ fn convert(options: &Given<'_>) -> Option<String> {
             .or_else(|| options.refuse(&MOTION, &no_motion))
             .or_else(|| options.refuse(&PEN, &why))
             .or_else(|| {
-                let without = format!("{why} but with --order optimize");
+                let without = format!("{why} without --order optimize");
                 options.refuse(&ORDERING, &without).filter(|_| options.text("order") != "optimize")
             })
             .or_else(|| sheet(options))

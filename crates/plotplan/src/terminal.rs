@@ -32,9 +32,8 @@ pub(crate) fn captured<T>(work: impl FnOnce() -> T) -> (T, String) {
 /// Prints text to standard error, in colour where the terminal supports it. Ignores a closed
 /// standard error.
 pub(crate) fn say(text: &str) {
-    let is_captured = CAPTURED.with_borrow_mut(|captured| {
-        captured.as_mut().map(|captured| captured.push_str(text)).is_some()
-    });
+    let is_captured = CAPTURED
+        .with_borrow_mut(|captured| captured.as_mut().map(|captured| captured.push_str(text)).is_some());
     if is_captured {
         return;
     }

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! `placement` is [`Header::placement`]; `limits` are speed, acceleration and, where given, jerk, in ticks and
-//! seconds. A reader needs `plotplan`, `machine`, `placement` and the limits of both motors; the last three comments
+//! seconds; `pen 2 color: #cc0000` is the colour that the drawing gives pen 2. A reader needs `plotplan`, `machine`, `placement` and the limits of both motors; the last three comments
 //! may be missing from a plan that another program wrote, and comments with other keys mean nothing here. Columns
 //! are in this order. Every line has its end, or the file was cut off.
 
@@ -23,7 +23,7 @@ use std::io::Write;
 
 use crate::{Header, Limits, MOTORS, Motor, Row, TickTable};
 
-use super::header::{Notes, RowCheck, assemble};
+use super::header::{Notes, RowCheck, assemble, hex};
 use super::text::{Line, Text, lines, parse_signed, parse_unsigned, shown};
 use super::{ReadError, RowsError, WriteError, check_header};
 
@@ -52,6 +52,9 @@ pub fn write<W: Write + ?Sized>(
     text.str("\n# period_us: ").int(header.period_us);
     if header.lift_overlap_us > 0 {
         text.str("\n# lift_overlap_us: ").int(header.lift_overlap_us);
+    }
+    for (pen, color) in &header.pen_colors {
+        text.str("\n# pen ").int(*pen).str(" color: ").str(&hex(*color));
     }
     text.str("\n# rows: ").int(header.rows);
     text.str("\n# duration_us: ").int(header.duration_us).str("\nt_us,pen");
@@ -131,6 +134,7 @@ pub fn read(bytes: &[u8]) -> Result<TickTable, ReadError> {
         motors,
         placement,
         [notes.count("period_us")?, notes.count("lift_overlap_us")?],
+        notes.pen_colors(),
         &rows,
     )?;
     Ok(TickTable { header, rows })

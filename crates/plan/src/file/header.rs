@@ -1,5 +1,7 @@
 //! Shared by all plan formats: validity of headers and rows, and `key: value` lines.
 
+use std::collections::BTreeMap;
+
 use crate::{Header, Limits, MOTORS, Motor, Row};
 
 use super::text::{Line, shown};
@@ -177,6 +179,15 @@ impl<'a> Notes<'a> {
         }
     }
 
+    /// The colours of pens: `pen 2 color: #cc0000`. Others mean nothing.
+    pub(crate) fn pen_colors(&self) -> BTreeMap<u16, [u8; 3]> {
+        let color = |&(_, key, value): &(u64, &str, &str)| {
+            let pen = key.strip_prefix("pen ")?.strip_suffix(" color")?;
+            Some((pen.parse().ok()?, color(value)?))
+        };
+        self.notes.iter().filter_map(color).collect()
+    }
+
     /// Exactly `N` finite numbers.
     pub(crate) fn array<const N: usize>(&self, key: &str, at: Line) -> Result<[f64; N], ReadError> {
         let mut array = [0.0; N];
@@ -195,12 +206,25 @@ impl<'a> Notes<'a> {
     }
 }
 
+/// A colour as `#rrggbb`.
+pub(crate) fn hex([red, green, blue]: [u8; 3]) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// The colour of `#rrggbb`.
+pub(crate) fn color(text: &str) -> Option<[u8; 3]> {
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii())?;
+    let part = |at: usize| u8::from_str_radix(&digits[at..at + 2], 16).ok();
+    Some([part(0)?, part(2)?, part(4)?])
+}
+
 /// A header from its parts and the rows. A missing period is the shortest time between rows.
 pub(crate) fn assemble(
     machine: &str,
     motors: [Motor; MOTORS],
     placement: [f64; 6],
     [period_us, lift_overlap_us]: [Option<u64>; 2],
+    pen_colors: BTreeMap<u16, [u8; 3]>,
     rows: &[Row],
 ) -> Result<Header, HeaderError> {
     let shortest = || rows.windows(2).map(|pair| pair[1].t_us - pair[0].t_us).min().unwrap_or(0);
@@ -210,6 +234,7 @@ pub(crate) fn assemble(
         placement,
         period_us: period_us.unwrap_or_else(shortest),
         lift_overlap_us: lift_overlap_us.unwrap_or(0),
+        pen_colors,
         rows: rows.len() as u64,
         duration_us: rows.last().map_or(0, |row| row.t_us),
     };

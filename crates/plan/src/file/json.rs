@@ -22,7 +22,7 @@ use crate::{Header, Limits, MOTORS, Motor, Row, TickTable};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::header::RowCheck;
+use super::header::{RowCheck, color, hex};
 use super::text::Text;
 use super::{ReadError, WriteError, check_header};
 
@@ -139,6 +139,13 @@ fn write_header<W: Write + ?Sized>(text: &mut Text<'_, W>, header: &Header) {
     if header.lift_overlap_us > 0 {
         text.str(",\n    \"lift_overlap_us\": ").int(header.lift_overlap_us);
     }
+    for (index, (pen, color)) in header.pen_colors.iter().enumerate() {
+        text.str(if index == 0 { ",\n    \"pen_colors\": {\"" } else { ", \"" }).int(*pen);
+        text.str("\": \"").str(&hex(*color)).byte(b'"');
+    }
+    if !header.pen_colors.is_empty() {
+        text.byte(b'}');
+    }
     text.str(",\n    \"rows\": ").int(header.rows);
     text.str(",\n    \"duration_us\": ").int(header.duration_us).str("\n  },\n");
 }
@@ -190,6 +197,8 @@ struct WirePlan {
     period_us: u64,
     #[serde(default)]
     lift_overlap_us: u64,
+    #[serde(default)]
+    pen_colors: BTreeMap<u16, String>,
     rows: u64,
     duration_us: u64,
 }
@@ -237,6 +246,7 @@ pub fn read(bytes: &[u8]) -> Result<(Document, TickTable), ReadError> {
         placement: plan.placement,
         period_us: plan.period_us,
         lift_overlap_us: plan.lift_overlap_us,
+        pen_colors: plan.pen_colors.iter().filter_map(|(pen, text)| Some((*pen, color(text)?))).collect(),
         rows: plan.rows,
         duration_us: plan.duration_us,
     };

@@ -18,7 +18,7 @@ use std::io::Write;
 
 use crate::{Header, Limits, MOTORS, Motor, Row, TickTable};
 
-use super::header::{Notes, RowCheck, assemble};
+use super::header::{Notes, RowCheck, assemble, hex};
 use super::text::{Line, Text, lines, parse_signed, parse_unsigned, shown};
 use super::{ReadError, WriteError, check_header};
 
@@ -86,6 +86,9 @@ fn write_header<W: Write + ?Sized>(text: &mut Text<'_, W>, header: &Header) {
     text.str("; period_us: ").int(header.period_us);
     if header.lift_overlap_us > 0 {
         text.str("\n; lift_overlap_us: ").int(header.lift_overlap_us);
+    }
+    for (pen, color) in &header.pen_colors {
+        text.str("\n; pen ").int(*pen).str(" color: ").str(&hex(*color));
     }
     text.str("\nbegin 1 ").int(header.rows.saturating_sub(1)).byte(b' ').int(header.duration_us).byte(b'\n');
 }
@@ -226,6 +229,7 @@ fn read_header(notes: &Notes<'_>, begin: Line, rows: &[Row]) -> Result<Header, R
         motors,
         [a, b, c, d, e, f],
         [notes.count("period_us")?, notes.count("lift_overlap_us")?],
+        notes.pen_colors(),
         rows,
     )?)
 }

@@ -55,7 +55,12 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     }
     if let Some(machine) = &machine {
         let drawing = drawn.drawing();
-        let request = super::request(&arguments.planning, arguments.reading.layout.crop, drawn.page(), &machine.machine);
+        let request = super::request(
+            &arguments.planning,
+            arguments.reading.layout.crop,
+            drawn.page(),
+            &machine.machine,
+        );
         match pipeline::place(drawing, &machine.machine, &request.placement, request.crop) {
             Ok(placed) => {
                 let _ = writeln!(text, "{} can draw it", machine.machine.name());
@@ -68,10 +73,12 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
                     }
                 }
             }
-            Err(error) => match super::convert::explain(&inputs, drawing, &machine.machine, &request, error) {
-                Failure::Refused => refused = true,
-                other => return Err(other),
-            },
+            Err(error) => {
+                match super::convert::explain(&inputs, drawing, &machine.machine, &request, error) {
+                    Failure::Refused => refused = true,
+                    other => return Err(other),
+                }
+            }
         }
     }
     output::write("-", |out| out.write_all(text.as_bytes()))?;

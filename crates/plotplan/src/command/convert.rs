@@ -200,10 +200,7 @@ fn plan(
             Format::Csv => plan::file::csv::write(&compiled.header, rows(), out),
             Format::Json => {
                 let document = plan::file::json::Document {
-                    source: plan::file::json::Source {
-                        name: inputs.name(),
-                        sha256: inputs.sha256(),
-                    },
+                    source: plan::file::json::Source { name: inputs.name(), sha256: inputs.sha256() },
                     machine: serde_json::to_value(&machine.file)?,
                     settings: serde_json::to_value(&settings)?,
                     summary: serde_json::to_value(&summary)?,

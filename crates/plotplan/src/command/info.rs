@@ -88,7 +88,12 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<String, Failure> {
     }
     text.push_str(&findings(&document.diagnostics));
     if let Some(machine) = machine {
-        let request = super::request(&arguments.planning, arguments.reading.layout.crop, drawn.page(), &machine.machine);
+        let request = super::request(
+            &arguments.planning,
+            arguments.reading.layout.crop,
+            drawn.page(),
+            &machine.machine,
+        );
         let compiled = super::convert::compile(inputs, drawn.drawing(), &machine.machine, &request)?;
         text.push('\n');
         text.push_str(&text::summary(&machine.machine, &compiled));

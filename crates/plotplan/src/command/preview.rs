@@ -73,5 +73,6 @@ fn of_drawing(inputs: &Inputs, arguments: &Preview) -> Result<Scene, Failure> {
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
     let (plan, machine) = super::verify::plan(input, machine)?;
     let machine = &machine.machine;
-    Ok(scene::of_plan(&format!("{} on {}", input.name, machine.name()), &plan.table.rows, machine))
+    let title = format!("{} on {}", input.name, machine.name());
+    Ok(scene::of_plan(&title, &plan.table.rows, machine, plan.table.header.pen_colors))
 }

@@ -88,6 +88,7 @@ pub fn header(machine: &Machine) -> Header {
         period_us: PERIOD_US,
         rows: 0,
         lift_overlap_us: 0,
+        pen_colors: std::collections::BTreeMap::new(),
         duration_us: 0,
     }
 }

@@ -58,8 +58,8 @@ pub(super) fn run(job: &Job<'_>, names: &Names) -> Result<(), Failure> {
 
 /// Converts one file, and prints a line about it. Whether it was written.
 fn convert(job: &Job<'_>, file: &str, names: &Names) -> bool {
-    let result = Inputs::read(&[file.to_owned()])
-        .and_then(|inputs| super::convert_parts(job, &inputs, names));
+    let result =
+        Inputs::read(&[file.to_owned()]).and_then(|inputs| super::convert_parts(job, &inputs, names));
     match result {
         Ok(written) => {
             for (output, Written { line, .. }) in written {

@@ -52,7 +52,8 @@ impl Names {
 
     /// The name of a file.
     pub(super) fn file(&self, part: Part<'_>) -> String {
-        let stem = Path::new(part.drawing).file_stem().map_or("drawing".into(), |stem| stem.to_string_lossy());
+        let stem =
+            Path::new(part.drawing).file_stem().map_or("drawing".into(), |stem| stem.to_string_lossy());
         let pen = part.pen.map_or_else(String::new, |pen| pen.to_string());
         let page = if self.pens && !self.pages { pen.clone() } else { part.page.to_string() };
         self.pattern.replace("%p", &page).replace("%n", &pen).replace("%f", &stem)
