@@ -18,7 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("verify", &["drawing", "kinematics", "plan"]),
     ("simulation", &["drawing", "kinematics", "plan"]),
     ("picture", &["drawing", "plan"]),
-    ("backends", &["drawing", "kinematics", "plan"]),
+    ("backends", &["drawing", "hpgl", "kinematics", "plan"]),
     (
         "compiler",
         &[
@@ -62,7 +62,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("clap", &["plotplan"]),
     ("serialport", &["plotplan"]),
     ("indicatif", &["plotplan"]),
-    ("toml", &["compiler", "xtask"]),
+    ("toml", &["backends", "compiler", "xtask"]),
     ("serde", &["backends", "compiler", "plan", "plotplan"]),
     ("serde_json", &["backends", "compiler", "plan", "plotplan", "xtask"]),
 ];

@@ -2,12 +2,14 @@
 
 use std::fmt;
 use std::io::Write;
+use std::sync::Arc;
 
 use drawing::Drawing;
 use kinematics::Machine;
 use plan::{Header, Row, TickTable};
 
 use crate::device::Device;
+use crate::pen_plotter::plotter::{Handshake, Plotter};
 use crate::program::{Program, ProgramError};
 use crate::session::Session;
 use crate::status::StatusProtocol;
@@ -43,6 +45,11 @@ pub trait Backend: fmt::Debug + Send + Sync {
         Ok(())
     }
 
+    /// What [`crate::Line::row`] counts, in messages.
+    fn row_name(&self) -> &'static str {
+        "row"
+    }
+
     /// What becomes of the pens' numbers.
     fn pens(&self) -> PenNumbers;
 
@@ -76,7 +83,7 @@ pub trait Backend: fmt::Debug + Send + Sync {
     }
 
     /// A program from a file in the machine's own language; `None` if plans alone are sent.
-    fn parse_program(&self, _text: &str) -> Option<Program> {
+    fn parse_program(&self, _file: &[u8]) -> Option<Program> {
         None
     }
 
@@ -262,8 +269,12 @@ pub struct EncodeOptions {
 }
 
 /// How a program is sent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionOptions {
+    /// For pen plotters: the plotter; by its own answer if `None`.
+    pub plotter: Option<Arc<Plotter>>,
+    /// For pen plotters: how the buffer is kept from overflowing; by polling if `None`.
+    pub handshake: Option<Handshake>,
     /// Lines or bytes in transit at most; the session's own limit if `None`.
     pub window: Option<usize>,
     /// How long before its time a line is sent, where the sender keeps the plan's time, microseconds.
@@ -294,4 +305,6 @@ pub enum InkFrame {
     TicksFromStart,
     /// Pen positions in machine mm with this many decimals.
     Millimetres(u8),
+    /// Pen positions in plotter units of 0.025 mm.
+    PlotterUnits,
 }

@@ -27,6 +27,15 @@ pub trait Device {
         self.advance(now_us);
     }
 
+    /// The wire is unplugged: bytes in transit are lost.
+    fn disconnect(&mut self) {}
+
+    /// The power fails and returns: the machine forgets everything, but for where it stands.
+    fn power_cut(&mut self, _now_us: u64) {}
+
+    /// The operator holds the machine, or lets it go.
+    fn hold(&mut self, _held: bool, _now_us: u64) {}
+
     /// Free bytes in the receive buffer: flow control lets no more through.
     fn room(&self) -> usize {
         self.port().room()

@@ -20,6 +20,10 @@ pub enum Fault {
     Unplugged(u64, u64),
     /// One bit of the sent byte of this number is flipped.
     GarbledByte(u64),
+    /// At this time the power fails and returns.
+    PowerCut(u64),
+    /// From this time the operator holds the machine, for this long, microseconds.
+    Held(u64, u64),
 }
 
 /// A machine behind such a wire.
@@ -28,6 +32,8 @@ pub struct FaultInjector {
     faults: Vec<Fault>,
     answered: u64,
     received: u64,
+    /// Power cuts that have happened.
+    cut: Vec<u64>,
     /// Answers on their way, with the time from which they may be heard.
     wire: VecDeque<(u64, Vec<u8>)>,
 }
@@ -41,7 +47,7 @@ impl std::fmt::Debug for FaultInjector {
 impl FaultInjector {
     /// A machine behind a wire with these faults.
     pub fn new(device: Box<dyn Device>, faults: Vec<Fault>) -> Self {
-        Self { device, faults, answered: 0, received: 0, wire: VecDeque::new() }
+        Self { device, faults, answered: 0, received: 0, cut: Vec::new(), wire: VecDeque::new() }
     }
 
     /// The machine.
@@ -60,13 +66,24 @@ impl FaultInjector {
     /// Advances the clock.
     pub fn advance(&mut self, now_us: u64) {
         for fault in &self.faults {
-            if let Fault::FullBuffer(at, lasts) = fault
-                && (*at..at + lasts).contains(&now_us)
-            {
-                self.device.stall(at + lasts);
+            match fault {
+                Fault::FullBuffer(at, lasts) if (*at..at + lasts).contains(&now_us) => {
+                    self.device.stall(at + lasts);
+                }
+                Fault::Held(at, lasts) if now_us >= *at => {
+                    self.device.hold((*at..at + lasts).contains(&now_us), now_us);
+                }
+                Fault::PowerCut(at) if now_us >= *at && !self.cut.contains(at) => {
+                    self.cut.push(*at);
+                    self.device.power_cut(now_us);
+                }
+                _ => {}
             }
         }
         self.device.advance(now_us);
+        if !self.plugged(now_us) {
+            self.device.disconnect();
+        }
         self.collect(now_us);
     }
 
@@ -128,7 +145,10 @@ impl FaultInjector {
     /// When something next happens without input.
     pub fn wake_us(&self, now_us: u64) -> Option<u64> {
         let faults = self.faults.iter().flat_map(|fault| match fault {
-            Fault::FullBuffer(at, lasts) | Fault::Unplugged(at, lasts) => vec![*at, at + lasts],
+            Fault::FullBuffer(at, lasts) | Fault::Unplugged(at, lasts) | Fault::Held(at, lasts) => {
+                vec![*at, at + lasts]
+            }
+            Fault::PowerCut(at) => vec![*at],
             _ => Vec::new(),
         });
         let heard = self.wire.front().map(|(heard_us, _)| *heard_us);

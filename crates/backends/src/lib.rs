@@ -15,6 +15,7 @@ mod halstreamer;
 mod ink;
 mod joint_trajectory;
 mod klipper_steps;
+pub mod pen_plotter;
 mod polar;
 mod position_query;
 pub mod program;
@@ -60,6 +61,7 @@ pub const ALL: &[&dyn Backend] = &[
     &joint_trajectory::JointTrajectory,
     &halstreamer::Halstreamer,
     &pvt::Pvt,
+    &pen_plotter::HpGlPlotter,
     &tick_lines::Raw,
     &tick_lines::Paced,
 ];

@@ -23,6 +23,10 @@ pub struct Progress {
     pub queries: u64,
     /// Whether the machine has acknowledged anything; without that, `lines` and `done_us` count what was sent.
     pub acknowledged: bool,
+    /// Ink drawn, and ink of the whole program, mm; where the session knows it.
+    pub ink_mm: Option<[u64; 2]>,
+    /// Why the machine does not move, if it says so.
+    pub note: Option<&'static str>,
 }
 
 impl Progress {
@@ -39,6 +43,8 @@ impl Progress {
             retransmitted: 0,
             queries: 0,
             acknowledged: acked > 0,
+            ink_mm: None,
+            note: None,
         }
     }
 }

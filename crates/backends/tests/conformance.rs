@@ -601,7 +601,7 @@ proptest! {
             }
         }
         for backend in backends::ALL {
-            let Some(program) = backend.parse_program(&text) else { continue };
+            let Some(program) = backend.parse_program(text.as_bytes()) else { continue };
             for sent in 0..=program.lines.len() {
                 let (_, row) = program.stop_sequence(sent);
                 let _ = program.from_row(row, None);

@@ -402,7 +402,7 @@ pub(crate) struct Preview {
 
 #[derive(Debug, Args)]
 pub(crate) struct Send {
-    /// Plan to send, or for gcode, xy-serial and raw a file in the machine's own language; `-` for standard input
+    /// Plan to send, or for gcode, xy-serial, hpgl and raw a file in the machine's own language; `-` for standard input
     pub(crate) plan: String,
     /// Serial device, pseudo-terminal, or tcp:HOST:PORT
     #[arg(short, long, value_name = "PATH", required_unless_present = "dry_run")]
@@ -413,10 +413,13 @@ pub(crate) struct Send {
     /// Speed of the port
     #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
     pub(crate) baud: u32,
-    /// Flow control of the port
+    /// Flow control of the port; for hpgl also set on the plotter, which is asked for the room in its buffer either way
     #[arg(long, value_enum, default_value_t = Flow::None)]
     pub(crate) flow: Flow,
-    /// Resume from this row of the plan: where it was stopped, or where a sync line is
+    /// For hpgl: the plotter, by name or by a file with its limits [default: as it answers OI]
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    pub(crate) plotter: Option<String>,
+    /// Resume from this row of the plan (for hpgl: after this stroke): where it was stopped, or where a sync line is
     #[arg(long, value_name = "ROW")]
     pub(crate) from: Option<u64>,
     /// Print every line with its time and send nothing
@@ -512,7 +515,7 @@ pub(crate) struct Emulate {
     /// For ticks and ebb: the machine, for the motors' start and the picture
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
-    /// Fault to inject: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N
+    /// Fault to inject: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N, held=AT:TIME, power-cut=AT
     #[arg(long, value_name = "FAULT", value_parser = fault)]
     pub(crate) fault: Vec<backends::Fault>,
     /// Run this many times faster than real time
@@ -802,6 +805,8 @@ fn fault(text: &str) -> Result<backends::Fault, String> {
         "garbled-byte" => Fault::GarbledByte(number(first)?),
         "full-buffer" => Fault::FullBuffer(microseconds(first)?, lasting()?),
         "unplugged" => Fault::Unplugged(microseconds(first)?, lasting()?),
+        "held" => Fault::Held(microseconds(first)?, lasting()?),
+        "power-cut" => Fault::PowerCut(microseconds(first)?),
         _ => return Err(what.to_owned()),
     })
 }

@@ -283,7 +283,14 @@ impl SendingProgress {
         self.bar.set_length(progress.of_us / 1000);
         self.bar.set_position(progress.done_us / 1000);
         let left = compiler::report::text::duration(left);
-        self.bar.set_message(format!("line {} of {}, {left} left", progress.lines, progress.of_lines));
+        let done = match progress.ink_mm {
+            Some([drawn, all]) => {
+                format!("{:.2} of {:.2} m of ink", drawn as f64 / 1000.0, all as f64 / 1000.0)
+            }
+            None => format!("line {} of {}", progress.lines, progress.of_lines),
+        };
+        let note = progress.note.map(|note| format!(" ({note})")).unwrap_or_default();
+        self.bar.set_message(format!("{done}, {left} left{note}"));
     }
 
     pub(crate) fn finish(&self) {

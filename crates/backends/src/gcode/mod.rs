@@ -118,8 +118,9 @@ impl Backend for Paths {
         Ok(program::program(encode::timed(plan.setpoints(self.name())?, &options, false)))
     }
 
-    fn parse_program(&self, text: &str) -> Option<Program> {
-        Some(program::parse(text))
+    fn parse_program(&self, file: &[u8]) -> Option<Program> {
+        let text = String::from_utf8_lossy(file);
+        Some(program::parse(&text))
     }
 
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {

@@ -109,8 +109,9 @@ impl Backend for Raw {
         program(plan)
     }
 
-    fn parse_program(&self, text: &str) -> Option<Program> {
-        Some(Program::opaque(text))
+    fn parse_program(&self, file: &[u8]) -> Option<Program> {
+        let text = String::from_utf8_lossy(file);
+        Some(Program::opaque(&text))
     }
 
     fn session(&self, program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {

@@ -86,7 +86,8 @@ impl Backend for XySerial {
         Ok(Program::of_lines(lines, Arc::new(Language)))
     }
 
-    fn parse_program(&self, text: &str) -> Option<Program> {
+    fn parse_program(&self, file: &[u8]) -> Option<Program> {
+        let text = String::from_utf8_lossy(file);
         let lines = text.lines().map(|line| line.split(';').next().unwrap_or_default().trim());
         let lines = (1..).zip(lines.filter(|line| !line.is_empty()));
         let lines = lines.map(|(row, text)| Line { text: text.to_owned(), row, ..Line::default() });

@@ -188,6 +188,7 @@ impl Setup {
                 let unit = (0..decimals).fold(1.0, |unit, _| unit * 10.0);
                 row.ticks.map(|ticks| ((60.0 + ticks as f64 / 50.0) * unit).round() / unit)
             }
+            InkFrame::PlotterUnits => row.ticks.map(|ticks| ((60.0 + ticks as f64 / 50.0) / 0.025).round()),
         };
         let sent = self.backend.pens() == PenNumbers::Sent;
         let mut ink = Ink::default();

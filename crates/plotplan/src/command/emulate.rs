@@ -150,16 +150,17 @@ fn write_ink(ink: &backends::Ink, out: &mut dyn std::io::Write) -> std::io::Resu
 /// The ink as a picture. Motor positions go through the machine's kinematics where it is known.
 fn scene(arguments: &Emulate, machine: Option<&LoadedMachine>, ink: &backends::Ink) -> Scene {
     let frame = arguments.protocol.0.ink_frame();
-    let machine = machine.filter(|_| !matches!(frame, InkFrame::Millimetres(_)));
+    let machine = machine.filter(|_| !matches!(frame, InkFrame::Millimetres(_) | InkFrame::PlotterUnits));
     let origin = match (frame, machine) {
         (InkFrame::TicksFromStart, Some(machine)) => start_ticks(machine).map(|ticks| ticks as f64),
         _ => [0.0; 2],
     };
+    let unit_mm = if frame == InkFrame::PlotterUnits { hpgl::PLOTTER_UNIT_7475A_MM } else { 1.0 };
     let place = |place: &[f64; 2]| match machine {
         Some(machine) => {
             machine.machine.forward_from_motors(&MotorPos::from([place[0] + origin[0], place[1] + origin[1]]))
         }
-        None => Point::new(place[0], place[1]),
+        None => Point::new(place[0] * unit_mm, place[1] * unit_mm),
     };
     let lines = ink.lines();
     let ink: Vec<Ink> = lines

@@ -1,9 +1,13 @@
 //! `plotplan send`: a plan to a machine.
 
 use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::Context as _;
+use backends::pen_plotter::plotter::{Handshake, Plotter};
 use backends::{Backend, Outcome, PlanSource, Program, ProgramError, RowIter, Session, SessionOptions};
+use compiler::import;
 use plan::TickTable;
 use serialport::FlowControl;
 
@@ -38,7 +42,10 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
             let position = wire.query_position(status)?;
             let found = position.and_then(|position| program.row_at_position(row, position));
             if let Some(found) = found.filter(|found| *found != row) {
-                terminal::say(&format!("the machine has reached row {found}: resuming from there\n"));
+                terminal::say(&format!(
+                    "the machine has reached {} {found}: resuming from there\n",
+                    backend.row_name()
+                ));
             }
             let position = position.or(program.start_position());
             program.from_row(found.unwrap_or(row), position).map_err(|error| Failure::Usage(error.into()))?
@@ -46,13 +53,53 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
         _ => from_row(arguments, &program, None)?,
     };
     let lead_us = (arguments.lead * 1e6).round() as u64;
-    let options = SessionOptions { window: arguments.window, lead_us };
+    let options = SessionOptions {
+        window: arguments.window,
+        lead_us,
+        plotter: plotter(arguments.plotter.as_deref())?.map(Arc::new),
+        handshake: Some(match arguments.flow {
+            Flow::None => Handshake::Polling,
+            Flow::Hardware => Handshake::Hardware,
+            Flow::Software => Handshake::XonXoff,
+        }),
+    };
+    check_handshake(&options)?;
     let Some(mut session) = backend.session(program, &options) else {
         return Err(Failure::Usage(anyhow::anyhow!("{} cannot be sent", backend.name())));
     };
     // Standard input has the plan, or the operator's keys.
     let outcome = wire.run(&mut *session, arguments.reconnect, arguments.plan != "-");
-    report(&outcome, &*session, wire.is_interrupted())
+    report(&outcome, &*session, wire.is_interrupted(), backend.row_name())
+}
+
+/// The plotter of this name, or the one that this file describes.
+pub(super) fn plotter(name: Option<&str>) -> Result<Option<Plotter>, Failure> {
+    let Some(name) = name else { return Ok(None) };
+    if !Path::new(name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+        return Plotter::named(name).cloned().map(Some).map_err(|error| Failure::Usage(error.into()));
+    }
+    let bytes = input::read_file(Path::new(name)).with_context(|| format!("cannot read {name}"));
+    let text = String::from_utf8_lossy(&bytes.map_err(Failure::Io)?).into_owned();
+    Plotter::parse(name, &text).map(Some).map_err(|error| Failure::Usage(error.into()))
+}
+
+/// Refuses a handshake that the plotter does not have.
+fn check_handshake(options: &SessionOptions) -> Result<(), Failure> {
+    let (Some(plotter), Some(handshake)) = (&options.plotter, options.handshake) else { return Ok(()) };
+    if plotter.has(handshake) {
+        return Ok(());
+    }
+    let known: Vec<&str> = plotter
+        .handshakes
+        .iter()
+        .map(|handshake| match handshake {
+            Handshake::Polling => "--flow none (polling)",
+            Handshake::XonXoff => "--flow software",
+            Handshake::Hardware => "--flow hardware",
+        })
+        .collect();
+    let what = format!("{} is not sent to without flow control: use {}", plotter.title, known.join(" or "));
+    Err(Failure::Usage(anyhow::anyhow!(what)))
 }
 
 /// The program from the row where it is to begin.
@@ -64,9 +111,11 @@ fn from_row(arguments: &Send, program: &Program, position: Option<[i64; 2]>) -> 
 /// What is sent: the lines of a plan, or those of a file in the machine's own language.
 fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Program, Failure> {
     if !plan::file::is_plan(&input.bytes) {
-        let text = String::from_utf8_lossy(&input.bytes);
+        if backend.name() == "hpgl" {
+            refuse_other_drawings(input)?;
+        }
         let what = || format!("{} is not a plan; this protocol sends plans (ticks, csv or json)", input.name);
-        return backend.parse_program(&text).ok_or_else(|| Failure::Drawing(anyhow::anyhow!(what())));
+        return backend.parse_program(&input.bytes).ok_or_else(|| Failure::Drawing(anyhow::anyhow!(what())));
     }
     let (table, machine) = if backend.needs_machine() {
         let (plan, machine) = super::verify::plan(input, arguments.machine.as_deref())?;
@@ -88,6 +137,20 @@ fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Pro
     encode.legacy_moves = arguments.stepper_moves;
     let unfit = |error: ProgramError| Failure::Drawing(error.into());
     backend.program(&source, &encode).map_err(unfit)
+}
+
+/// Refuses what a plotter cannot be sent: anything but HP-GL.
+fn refuse_other_drawings(input: &Input) -> Result<(), Failure> {
+    let document = import::read(&input.bytes, &import::Options::default())
+        .map_err(|error| Failure::Drawing(anyhow::Error::new(error).context(input.name.clone())))?;
+    if document.format == "HP-GL" {
+        return Ok(());
+    }
+    let what = format!(
+        "{} is {}; a plotter takes HP-GL: plotplan convert --format hpgl --plotter NAME writes it",
+        input.name, document.format
+    );
+    Err(Failure::Drawing(anyhow::anyhow!(what)))
 }
 
 /// Warns where the machine will not receive the plan's pens.
@@ -115,7 +178,7 @@ fn dry_run(arguments: &Send, program: &Program) -> Result<(), Failure> {
 }
 
 /// Reports how it ended, and how to resume.
-fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool) -> Result<(), Failure> {
+fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool, name: &str) -> Result<(), Failure> {
     let progress = session.progress();
     let mut extra = String::new();
     if progress.retransmitted > 0 {
@@ -130,19 +193,21 @@ fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool) -> Result
     };
     match outcome {
         Outcome::Done => {
-            terminal::say(&format!("sent {} lines{extra}\n", progress.lines));
+            let ink = progress.ink_mm.map(|[drawn, _]| format!(", {} m of ink drawn", drawn as f64 / 1000.0));
+            let ink = ink.unwrap_or_default();
+            terminal::say(&format!("sent {} lines{extra}{ink}\n", progress.lines));
             Ok(())
         }
         Outcome::Stopped { row } if !progress.acknowledged => {
             terminal::say(&format!(
-                "stopped after sending everything up to row {row}; the machine acknowledged nothing. Check that the pen is up, then resume with\n  {}\n",
+                "stopped after sending everything up to {name} {row}; the machine acknowledged nothing. Check that the pen is up, then resume with\n  {}\n",
                 resume_command(*row)
             ));
             Err(Failure::Interrupted)
         }
         Outcome::Stopped { row } => {
             terminal::say(&format!(
-                "stopped at row {row} with the pen up{extra}; resume with\n  {}\n",
+                "stopped at {name} {row} with the pen up{extra}; resume with\n  {}\n",
                 resume_command(*row)
             ));
             Err(Failure::Interrupted)
@@ -156,12 +221,12 @@ fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool) -> Result
         }
         Outcome::Failed { row, last_sent_row, why } => {
             let unsure = if last_sent_row > row {
-                format!(" (it may have reached row {last_sent_row})")
+                format!(" (it may have reached {name} {last_sent_row})")
             } else {
                 String::new()
             };
             let text = format!(
-                "{why}; the machine has acknowledged everything up to row {row}{unsure}. Check that the pen is up, then resume with\n  {}",
+                "{why}; the machine has acknowledged everything up to {name} {row}{unsure}. Check that the pen is up, then resume with\n  {}",
                 resume_command(*row)
             );
             failed(text)

@@ -1,0 +1,184 @@
+//! Device control: `ESC.x` sequences, acted on as they are received.
+
+/// What a received byte means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Received {
+    /// A byte of HP-GL.
+    Text(u8),
+    /// Part of a sequence, or one without an answer.
+    Nothing,
+    /// `ESC.B`.
+    Room,
+    /// `ESC.L`.
+    Size,
+    /// `ESC.O`.
+    Status,
+    /// `ESC.E`.
+    LineError,
+    /// `ESC.J`.
+    DropAnswers,
+    /// `ESC.K`.
+    DropBuffer,
+    /// ENQ.
+    Enquiry,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+enum Parsing {
+    #[default]
+    Text,
+    /// After ESC.
+    Escape,
+    /// After ESC and a full stop.
+    Dot,
+    /// In the parameters of this letter.
+    Parameters(u8, String),
+}
+
+const ESC: u8 = 0x1B;
+const ENQ: u8 = 0x05;
+
+/// The receiver's state.
+#[derive(Clone, Debug)]
+pub(super) struct Control {
+    parsing: Parsing,
+    /// Off: everything but ESC.( is passed on to the terminal.
+    is_off: bool,
+    /// DTR is used.
+    pub(super) hardwire: bool,
+    /// Free bytes at which the sender is stopped.
+    pub(super) block: usize,
+    enquiry: u8,
+    /// XON, if XON/XOFF is on.
+    xon: Option<u8>,
+    xoff: Option<u8>,
+    pub(super) turnaround_us: u64,
+    pub(super) initiator: Option<u8>,
+    pub(super) terminators: Vec<u8>,
+    error: u8,
+    pub(super) wants_size: bool,
+    pub(super) owes_ack: bool,
+}
+
+impl Default for Control {
+    fn default() -> Self {
+        Self {
+            parsing: Parsing::Text,
+            is_off: false,
+            hardwire: true,
+            block: 80,
+            enquiry: 0,
+            xon: None,
+            xoff: None,
+            turnaround_us: 0,
+            initiator: None,
+            terminators: vec![13],
+            error: 0,
+            wants_size: false,
+            owes_ack: false,
+        }
+    }
+}
+
+impl Control {
+    /// A byte, 7 bits.
+    pub(super) fn receive(&mut self, byte: u8) -> Received {
+        match std::mem::take(&mut self.parsing) {
+            _ if byte == ESC => self.parsing = Parsing::Escape,
+            Parsing::Text if self.is_off => {}
+            Parsing::Text if byte == ENQ => return Received::Enquiry,
+            Parsing::Text => return Received::Text(byte),
+            Parsing::Escape if byte == b'.' => self.parsing = Parsing::Dot,
+            // Not device control: the text of HP-GL, without the ESC.
+            Parsing::Escape if self.is_off => {}
+            Parsing::Escape => return Received::Text(byte),
+            Parsing::Dot => return self.letter(byte),
+            Parsing::Parameters(letter, text) if byte == b':' => self.parameters(letter, &text),
+            Parsing::Parameters(letter, mut text) => {
+                if byte.is_ascii_digit() || byte == b';' {
+                    text.push(char::from(byte));
+                    self.parsing = Parsing::Parameters(letter, text);
+                } else {
+                    self.error(12);
+                }
+            }
+        }
+        Received::Nothing
+    }
+
+    fn letter(&mut self, letter: u8) -> Received {
+        if self.is_off && !matches!(letter, b'(' | b'Y') {
+            return Received::Nothing;
+        }
+        match letter {
+            b'(' | b'Y' => self.is_off = false,
+            b')' | b'Z' => self.off(),
+            b'@' | b'H' | b'I' | b'M' | b'N' => self.parsing = Parsing::Parameters(letter, String::new()),
+            b'B' => return Received::Room,
+            b'E' => return Received::LineError,
+            b'J' => return Received::DropAnswers,
+            b'K' => return Received::DropBuffer,
+            b'L' => return Received::Size,
+            b'O' => return Received::Status,
+            b'R' => {
+                let (error, is_off) = (self.error, self.is_off);
+                *self = Self { error, is_off, ..Self::default() };
+            }
+            _ => self.error(11),
+        }
+        Received::Nothing
+    }
+
+    fn parameters(&mut self, letter: u8, text: &str) {
+        let values: Vec<Option<u32>> = text.split(';').map(|value| value.parse().ok()).collect();
+        let value = |place: usize| values.get(place).copied().flatten();
+        let byte = |place: usize| value(place).map(|value| value as u8).filter(|byte| *byte != 0);
+        if values.len() > 12 {
+            return self.error(14);
+        }
+        match letter {
+            // The size of the buffer is cut to what there is.
+            b'@' => self.hardwire = value(1).unwrap_or(1) & 1 != 0,
+            b'H' | b'I' => {
+                self.block = value(0).unwrap_or(80) as usize;
+                self.enquiry = byte(1).unwrap_or(0);
+                self.xon = byte(2).filter(|_| letter == b'I' && self.enquiry == 0);
+            }
+            b'M' => {
+                // 1.1875 p modulo 65536, in units of 1/1.2 ms.
+                let p = f64::from(value(0).unwrap_or(0));
+                self.turnaround_us = ((1.1875 * p) % 65_536.0 / 1.2 * 1000.0) as u64;
+                self.terminators = [byte(3).or(Some(13)), byte(4)].into_iter().flatten().collect();
+                self.initiator = byte(5);
+            }
+            _ => self.xoff = byte(1),
+        }
+    }
+
+    /// XOFF and XON, if that is on.
+    pub(super) fn xon_xoff(&self) -> Option<(u8, u8)> {
+        Some((self.xoff?, self.xon?))
+    }
+
+    /// Whether an enquiry waits for room.
+    pub(super) fn enquiry_is_honest(&self) -> bool {
+        self.enquiry == ENQ
+    }
+
+    pub(super) fn off(&mut self) {
+        self.is_off = true;
+    }
+
+    pub(super) fn error(&mut self, number: u8) {
+        self.error = number;
+    }
+
+    pub(super) fn overflow(&mut self) {
+        self.error(16);
+    }
+
+    /// The latched error, which is then cleared.
+    pub(super) fn take_error(&mut self) -> u8 {
+        std::mem::take(&mut self.error)
+    }
+}
