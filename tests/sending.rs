@@ -539,3 +539,133 @@ fn dry_run_output() {
     let mut output = output;
     assert_eq!(output.output().expect("runs").status.code(), Some(2));
 }
+
+/// The strokes of a file for the plotter, in plotter units.
+fn plotter_strokes(file: &Path) -> Lines {
+    let options = hpgl::Options { plotter_unit_mm: 1.0, ..hpgl::Options::default() };
+    let document = hpgl::read(&std::fs::read(file).expect("a file"), &options);
+    let strokes = document.pages[0].drawing.strokes.iter();
+    strokes
+        .map(|stroke| (stroke.pen.0, stroke.points().map(|p| [p.x.round(), p.y.round()]).collect()))
+        .collect()
+}
+
+/// Two pens, a closed figure, a dot; A4 in an HP 7475A.
+const FOR_PLOTTER: &str = "IN;SP1;PU400,400;PD4000,400,4000,3000,400,3000,400,400;PU;SP2;PU600,900;PD3000,900;PU5000,900;PD;PU5000,2000;PD5000,2500,7000,2500,7000,5000;PU;";
+
+fn plotter_desk() -> Desk {
+    let desk = Desk::new(FOR_PLOTTER);
+    desk.good(&[
+        "convert",
+        "drawing.hpgl",
+        "-f",
+        "hpgl",
+        "--plotter",
+        "hp7475a",
+        "--paper",
+        "A4",
+        "-o",
+        "a.plt",
+    ]);
+    assert_eq!(plotter_strokes(&desk.path("a.plt")).len(), 4);
+    desk
+}
+
+#[test]
+fn pen_plotter_with_faults() {
+    let desk = plotter_desk();
+    let wanted = plotter_strokes(&desk.path("a.plt"));
+    let faults = [
+        "lost-answer=9",
+        "late-answer=8:20s",
+        "garbled-answer=9",
+        "full-buffer=9s:20s",
+        "held=10s:200s",
+        "unplugged=12s:20s",
+    ];
+    thread::scope(|scope| {
+        for (k, fault) in faults.into_iter().enumerate() {
+            let (desk, wanted) = (&desk, &wanted);
+            scope.spawn(move || {
+                let name = format!("tty-{k}");
+                let device = desk.device("hpgl", &name, &["--speedup", SPEEDUP, "--fault", fault]);
+                let sent = desk.good(&["send", "a.plt", "--protocol", "hpgl", "--port", &name]);
+                let said = String::from_utf8_lossy(&sent.stderr).into_owned();
+                assert!(said.contains("m of ink drawn"), "{fault}: {said}");
+                assert_eq!(device.ink(), *wanted, "{fault}: {said}");
+            });
+        }
+    });
+}
+
+#[test]
+fn pen_plotter_stopped_at_a_stroke_and_resumed() {
+    let desk = plotter_desk();
+    let wanted = plotter_strokes(&desk.path("a.plt"));
+    for flow in ["none", "software"] {
+        let name = format!("tty-{flow}");
+        let device = desk.device("hpgl", &name, &["--speedup", "4"]);
+        let mut sender = desk.command(&["send", "a.plt", "--protocol", "hpgl", "--port", &name]);
+        sender.args(["--flow", flow]);
+        let sender = sender.stderr(Stdio::piped()).spawn().expect("the program runs");
+        thread::sleep(Duration::from_millis(2500));
+        interrupt(&sender);
+        let output = sender.wait_with_output().expect("it ends");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(130), "{flow}: {said}");
+        assert!(said.contains("stopped at stroke"), "{flow}: {said}");
+        let command = said.lines().last().expect("a command").trim();
+        let words: Vec<&str> = command.split(' ').skip(1).collect();
+        assert_eq!(words[words.len() - 2], "--from", "{flow}: {said}");
+        desk.good(&words);
+        assert_eq!(device.ink(), wanted, "{flow}: {said}");
+    }
+}
+
+#[test]
+fn pen_plotter_refusals() {
+    let desk = plotter_desk();
+    let refused = |arguments: &[&str], wanted: &str| {
+        let output = desk.command(arguments).output().expect("the program runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && said.contains(wanted), "{arguments:?}: {said}");
+    };
+    let to =
+        |plotter, paper| ["convert", "drawing.hpgl", "-f", "hpgl", "--plotter", plotter, "--paper", paper];
+    refused(&to("hp7470a", "a3"), "hp7470a has no paper `a3`; it takes a4, a");
+    refused(&to("hp7471", "a4"), "unknown");
+    refused(&["send", "plan.svg", "--protocol", "hpgl", "--dry-run"], "cannot read plan.svg");
+    desk.good(&["convert", "drawing.hpgl", "-f", "svg", "-o", "plan.svg"]);
+    refused(
+        &["send", "plan.svg", "--protocol", "hpgl", "--dry-run"],
+        "plan.svg is SVG; a plotter takes HP-GL",
+    );
+    std::fs::write(desk.path("far.hpgl"), "IN;SP1;PU0,0;PD16000,0;PU;").expect("a file");
+    refused(
+        &["convert", "far.hpgl", "-f", "hpgl", "--plotter", "hp7475a", "--paper", "a4"],
+        "--fit scales it to the paper",
+    );
+    let _device = desk.device("hpgl", "tty", &["--speedup", SPEEDUP]);
+    refused(
+        &["send", "far.hpgl", "--protocol", "hpgl", "--port", "tty"],
+        "it reports the limits (OH) 0,0 to 11040,7721",
+    );
+    refused(
+        &["send", "a.plt", "--protocol", "hpgl", "--port", "tty", "--plotter", "hp7550a"],
+        "calls itself 7475A",
+    );
+    // Limits from a file.
+    let own = plotter_file("[0, 0, 5000, 5000]");
+    std::fs::write(desk.path("own.toml"), &own).expect("a file");
+    let command = ["convert", "drawing.hpgl", "-f", "hpgl", "--plotter", "own.toml"];
+    refused(&command, "own.toml draws from 0, 0 to 125.00, 125.00 mm on sheet");
+    desk.good(&[&command[..], &["--fit", "-o", "own.plt"]].concat());
+    std::fs::write(desk.path("own.toml"), own.replace("pens", "pencils")).expect("a file");
+    refused(&command, "unknown field `pencils`");
+}
+
+fn plotter_file(hard_clip: &str) -> String {
+    format!(
+        "title = \"own\"\nunit_mm = 0.025\npens = 2\nbuffer_bytes = 100\nhandshakes = [\"polling\"]\nmax_speed_cm_s = 10\n\n[[paper]]\nname = \"sheet\"\nhard_clip = {hard_clip}\n"
+    )
+}

@@ -112,7 +112,8 @@ proptest! {
         for (wanted, drawn) in drawing.strokes.iter().zip(&back.strokes) {
             prop_assert_eq!(wanted.pen, drawn.pen);
             let off = deviation(wanted, drawn) / sheet.plotter.unit_mm;
-            prop_assert!(off <= 1.0, "{} units off on {} {}", off, sheet.plotter.name, sheet.paper.name);
+            let what = || format!("{} {} {:?} {:?}", sheet.plotter.name, sheet.paper.name, wanted, drawn);
+            prop_assert!(off <= 1.0, "{} units off: {}", off, what());
         }
     }
 }

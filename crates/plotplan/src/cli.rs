@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
+use backends::pen_plotter::plotter::Plotter;
 use backends::{Backend, EncodeOptions, PenActuator};
 use clap::builder::PossibleValue;
 use clap::parser::ValueSource;
@@ -20,6 +21,15 @@ use compiler::{import, quantity};
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+impl Arguments {
+    /// With `--format hpgl`, `--plotter` is the plotter to write for.
+    pub(crate) fn settle(&mut self) {
+        if let Command::Convert(convert) = &mut self.command {
+            convert.settle();
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -74,6 +84,9 @@ pub(crate) struct Convert {
     /// With `--format hpgl`: write encoded polylines (PE) of HP-GL/2
     #[arg(long)]
     pub(crate) hpgl2: bool,
+    /// The plotter and paper to write for, of `--plotter` and `--paper`.
+    #[arg(skip)]
+    pub(crate) target: Option<(String, Option<String>)>,
     #[command(flatten)]
     pub(crate) pen: PenLift,
     #[command(flatten)]
@@ -86,6 +99,13 @@ pub(crate) struct Convert {
 }
 
 impl Convert {
+    fn settle(&mut self) {
+        let is_hpgl = matches!(self.format(), Ok(Format::Hpgl));
+        if let Some(name) = self.reading.plotter.take_if(|name| is_hpgl && is_target(name)) {
+            self.target = Some((name, self.reading.paper.take()));
+        }
+    }
+
     /// The format asked for, by name or by the extension of the output.
     pub(crate) fn format(&self) -> Result<Format, String> {
         let of_extension = || Format::of_extension(&self.output);
@@ -97,6 +117,12 @@ impl Convert {
             (Some(format), _) => Ok(format),
         }
     }
+}
+
+/// Whether `--plotter` names a plotter to write for, and not only one to read files of.
+pub(crate) fn is_target(name: &str) -> bool {
+    let is_file = Path::new(name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    is_file || Plotter::named(name).is_ok()
 }
 
 /// What each file holds.
@@ -143,9 +169,13 @@ pub(crate) struct Reading {
     /// Which page of the file to take, from 1; with `convert`, `all` writes one file for each page
     #[arg(long, value_name = "N|all", default_value = "1", value_parser = page)]
     pub(crate) page: PageChoice,
-    /// Plotter that the file was made for (see `plotplan explain plotters`) [default: from the file]
+    /// Plotter that the file was made for (see `plotplan explain plotters`) [default: from the file]. With `convert --format
+    /// hpgl`: the plotter to write for, or a TOML file with its limits
     #[arg(long, value_name = "NAME")]
     pub(crate) plotter: Option<String>,
+    /// Plotter and paper that the file was made for, where --plotter is another one
+    #[arg(long, value_name = "NAME[,PAPER]")]
+    pub(crate) made_for: Option<String>,
     /// The sheet on the machine: A4, A3,landscape, letter or 200x300mm. With --plotter: the paper of that plotter
     #[arg(long, value_name = "PAPER")]
     pub(crate) paper: Option<String>,
@@ -215,9 +245,15 @@ impl Layout {
 impl Reading {
     /// The options of the drawing's importer.
     pub(crate) fn options(&self) -> import::Options {
+        let made_for = self.made_for.as_ref().map(|text| match text.split_once(',') {
+            Some((plotter, paper)) => (plotter.to_owned(), Some(paper.to_owned())),
+            None => (text.clone(), None),
+        });
+        let by_plotter = || self.plotter.as_ref().map(|plotter| (plotter.clone(), self.paper.clone()));
+        let (plotter, paper) = made_for.or_else(by_plotter).unzip();
         import::Options {
-            plotter: self.plotter.clone(),
-            paper: self.plotter.as_ref().and(self.paper.clone()),
+            plotter,
+            paper: paper.flatten(),
             svg: import::SvgOptions {
                 pens: match self.pens {
                     Pens::Layers => import::PenRule::Layers,

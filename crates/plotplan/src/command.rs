@@ -10,6 +10,7 @@ mod preview;
 mod send;
 mod verify;
 
+use backends::pen_plotter::plotter;
 use clap::CommandFactory as _;
 use compiler::import::{self, Page, PenSettings};
 use compiler::layout::Crop;
@@ -36,7 +37,14 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
             if explain.code == "plotters" {
-                return output::write("-", |out| out.write_all(import::plotters().as_bytes()));
+                return output::write("-", |out| {
+                    writeln!(out, "Plotters of files (--plotter, --made-for):\n{}", import::plotters())?;
+                    write!(
+                        out,
+                        "Plotters to write for (convert --format hpgl --plotter):\n{}",
+                        plotter::list()
+                    )
+                });
             }
             let Some((title, explanation)) = import::explain(&explain.code) else {
                 let what = format!("unknown diagnostic code {} (e.g. H0101)", explain.code);

@@ -19,7 +19,8 @@ mod wire;
 fn main() -> ExitCode {
     use clap::{CommandFactory as _, FromArgMatches as _};
     let matches = cli::Arguments::command().get_matches();
-    let arguments = cli::Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let mut arguments = cli::Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    arguments.settle();
     if let Some(what) = options::without_effect(&matches) {
         return failure::Failure::Usage(anyhow::anyhow!(what)).report();
     }

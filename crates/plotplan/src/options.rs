@@ -3,7 +3,7 @@
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 
-use crate::cli::Format;
+use crate::cli::{self, Format};
 
 /// Options of planning proper.
 const PLANNING: [&str; 12] = [
@@ -32,9 +32,10 @@ const ORDERING: [&str; 3] = ["effort", "keep_direction", "pen_order"];
 /// Options of the firmware's pen.
 const PEN: [&str; 2] = ["pen_by", "pen_positions"];
 /// Options of the reader of a drawing.
-const READING: [&str; 12] = [
+const READING: [&str; 13] = [
     "page",
     "plotter",
+    "made_for",
     "paper",
     "pens",
     "hatch",
@@ -88,6 +89,11 @@ impl Given<'_> {
     fn has_machine_paper(&self) -> bool {
         self.has("paper") && !self.has("plotter")
     }
+
+    /// Whether `--plotter` names the plotter to write for; its paper is the sheet then.
+    fn has_target(&self) -> bool {
+        self.has("plotter") && cli::is_target(&self.text("plotter"))
+    }
 }
 
 fn convert(options: &Given<'_>) -> Option<String> {
@@ -109,7 +115,13 @@ fn convert(options: &Given<'_>) -> Option<String> {
                 let without = format!("{why} without --order optimize");
                 options.refuse(&ORDERING, &without).filter(|_| options.text("order") != "optimize")
             })
-            .or_else(|| sheet(options))
+            .or_else(|| {
+                let why = "with --format hpgl and --plotter";
+                options
+                    .refuse(&["hpgl2", "machine"], why)
+                    .filter(|_| format == "hpgl" && options.has_target())
+            })
+            .or_else(|| sheet(options).filter(|_| format != "hpgl" || !options.has_target()))
             .or_else(|| margin(options));
     }
     let has_pen = format.starts_with("gcode") || format.starts_with("ebb");
@@ -179,7 +191,7 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 33] = [
+    const VALUES: [(&str, Option<&str>); 34] = [
         ("--tolerance", Some("0.2mm")),
         ("--period", Some("20ms")),
         ("--order", Some("optimize")),
@@ -206,6 +218,7 @@ mod tests {
         ("--pen-positions", Some("1,2")),
         ("--page", Some("2")),
         ("--plotter", Some("hp7475a")),
+        ("--made-for", Some("hp7475a")),
         ("--only-pens", Some("1,3")),
         ("--pen-map", Some("2=1,4=2")),
         ("--copies", Some("3x2")),
@@ -245,6 +258,7 @@ mod tests {
                 row(&words);
             }
         }
+        row(&["plotplan", "convert", "x.svg", "--format", "hpgl", "--plotter", "draftpro"]);
         row(&["plotplan", "convert", "x.hpgl", "--order", "file"]);
         row(&["plotplan", "convert", "x.hpgl", "--law", "sine"]);
         row(&["plotplan", "convert", "x.hpgl", "--format", "hpgl", "--order", "optimize"]);

@@ -131,9 +131,10 @@ impl Encoder<'_> {
                     self.instruction("PD;".to_owned());
                 }
                 self.instruction(arc.text());
-                (here, drew) = (arc.end(here), true);
-                // Whole degrees end up to one degree short of the end.
-                if here != end {
+                drew = true;
+                // Whole degrees end up to one degree short of the end, and the plotter may or may not round
+                // where it stops.
+                if (arc.at(here, arc.sweep_degrees as f64) - point_of(end)).hypot() > 1e-6 {
                     points.push(end);
                 }
             } else {
@@ -193,6 +194,10 @@ impl Encoder<'_> {
             height: area.height(),
         })
     }
+}
+
+fn point_of(units: Units) -> Point {
+    Point::new(units.0 as f64, units.1 as f64)
 }
 
 /// An `AA` instruction. Its centre is in whole plotter units, its angles in whole degrees (HP 7470A
@@ -258,11 +263,6 @@ impl DeviceArc {
         center + Vec2::new(cos * arm.x - sin * arm.y, sin * arm.x + cos * arm.y)
     }
 
-    fn end(self, start: Units) -> Units {
-        let end = self.at(start, self.sweep_degrees as f64);
-        (end.x.round() as i64, end.y.round() as i64)
-    }
-
     /// The ends of its chords.
     fn vertices(self, start: Units) -> impl Iterator<Item = Point> {
         let count = (self.sweep_degrees.abs() as f64 / self.chord_degrees as f64).ceil() as usize;
@@ -287,7 +287,7 @@ impl DeviceArc {
         let short = (arc.sweep_rad.abs().to_degrees() - sweep.abs()).max(0.0);
         // Half diagonals of two rounded points.
         let rest = radius * short.to_radians() + 1.5;
-        let gap = (self.at(start, sweep) - Point::new(end.0 as f64, end.1 as f64)).hypot();
+        let gap = (self.at(start, sweep) - point_of(end)).hypot();
         if gap > rest { f64::INFINITY } else { circle + chord }
     }
 }

@@ -7,6 +7,7 @@ mod names;
 use std::collections::BTreeSet;
 
 use annotate_snippets::Level;
+use backends::pen_plotter::plotter::Plotter;
 use backends::{Backend, PlanSource, RowIter, WriteError};
 use compiler::import::Page;
 use compiler::layout::Layout;
@@ -34,6 +35,8 @@ struct Job<'a> {
     command_line: &'a [String],
     /// Always there for formats of plans.
     machine: Option<&'a LoadedMachine>,
+    /// The plotter that a drawing is written for.
+    plotter: Option<&'a Plotter>,
 }
 
 /// What was written.
@@ -55,7 +58,8 @@ pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Fa
             return Err(Failure::Usage(anyhow::anyhow!(what)));
         }
     };
-    let job = Job { arguments, format, command_line, machine: machine.as_ref() };
+    let plotter = super::send::plotter(arguments.target.as_ref().map(|(name, _)| &**name))?;
+    let job = Job { arguments, format, command_line, machine: machine.as_ref(), plotter: plotter.as_ref() };
     let names = Names::of(arguments, format);
     if names.is_one_per_drawing() && arguments.files.len() > 1 {
         return batch::run(&job, &names);

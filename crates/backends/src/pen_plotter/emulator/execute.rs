@@ -481,7 +481,6 @@ impl Interpreter {
                 self.relative = relative;
                 let chord = rest.first().copied().unwrap_or(5.0).abs();
                 let us = self.arc(center, *sweep, chord, ink);
-                self.at = self.at.map(f64::round);
                 return Step::lasting(us);
             }
             (b"CI", [radius, rest @ ..]) => return Step::lasting(self.circle(*radius, rest, ink)),

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use backends::pen_plotter::plotter::Sheet;
+use backends::pen_plotter::{self, PlotterLimit};
 use compiler::import::Page;
 use compiler::paper;
 use compiler::pipeline::{self, Arranged, Target};
@@ -23,7 +25,11 @@ use crate::terminal;
 pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Result<Written, Failure> {
     let arguments = job.arguments;
     let machine = job.machine.map(|loaded| &loaded.machine);
-    let target = target(machine, &arguments.reading)?;
+    let device = sheet(job)?;
+    let target = match &device {
+        Some(sheet) => Target::Sheet([sheet.area_mm().width(), sheet.area_mm().height()]),
+        None => target(machine, &arguments.reading)?,
+    };
     let order = super::order(&arguments.planning, job.format);
     let placement = command::placement(&arguments.planning.placement);
     let crop = arguments.reading.layout.crop;
@@ -35,13 +41,15 @@ pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Re
         }
         None => super::refusal(inputs, error),
     })?;
+    let instructions = device.map(|sheet| for_plotter(inputs, &arranged, &sheet)).transpose()?;
     warn_beyond(&arranged, arguments.reading.strict)?;
-    output::write(to, |out| match job.format {
-        Format::Svg => {
+    output::write(to, |out| match (job.format, &instructions) {
+        (_, Some(text)) => out.write_all(text.as_bytes()),
+        (Format::Svg, None) => {
             let style = picture::svg::Style { page: page_rect(target), colors: scene::pen_colors(page) };
             picture::svg::write(&arranged.drawing, &style, out)
         }
-        _ => {
+        (_, None) => {
             let mut options = hpgl::EmitOptions::default();
             if arguments.hpgl2 {
                 options.encoding = hpgl::Encoding::Base64;
@@ -59,6 +67,27 @@ pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Re
     let strokes = pluralize(arranged.drawing.strokes.len(), "stroke");
     let line = format!("{strokes}, {} of ink", length(arranged.drawing.length()));
     Ok(Written { said, line })
+}
+
+/// The sheet in the plotter that the drawing is written for.
+fn sheet<'a>(job: &Job<'a>) -> Result<Option<Sheet<'a>>, Failure> {
+    let paper = job.arguments.target.as_ref().and_then(|(_, paper)| paper.as_deref());
+    let sheet = job.plotter.map(|plotter| Sheet::named(plotter, paper)).transpose();
+    sheet.map_err(|error| Failure::Usage(error.into()))
+}
+
+/// The drawing in the plotter's instructions, one a line.
+fn for_plotter(inputs: &Inputs, arranged: &Arranged, sheet: &Sheet<'_>) -> Result<String, Failure> {
+    let lines = pen_plotter::encode(&arranged.drawing, sheet).map_err(|error| {
+        let help = match error {
+            PlotterLimit::OffPaper { .. } => {
+                "; --fit scales it to the paper, --align center moves it there, --crop sheet cuts it; --made-for reads a file of the same plotter as it was made"
+            }
+            _ => "; --pen-map or --only-pens choose others",
+        };
+        Failure::Drawing(anyhow::anyhow!("{}: {error}{help}", inputs.name()))
+    })?;
+    Ok(lines.iter().map(|line| format!("{}\n", line.text)).collect())
 }
 
 /// What drawings without a plan are arranged for.
