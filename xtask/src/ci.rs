@@ -29,7 +29,7 @@ const STEPS: &[Step] = &[
     step("tidy", "dependency rules and file checks", tidy),
     step("clippy", "lints", || cargo("clippy --workspace --all-targets --locked -- -D warnings")),
     step("doc", "documentation builds without warnings", doc),
-    step("test", "the test command of the README", || cargo("test --workspace --locked")),
+    step("test", "the test command of the README; installs gcc-avr and avr-libc if missing", test),
     step("wasm", "the compiler library builds for WebAssembly", || {
         check("wasm32-unknown-unknown", "plotplan-compiler")
     }),
@@ -127,6 +127,24 @@ fn succeeds(program: &str, arguments: &str) -> bool {
         .current_dir(crate::top())
         .output()
         .is_ok_and(|output| output.status.success())
+}
+
+/// All tests. Those of the C reader in docs/tick-lines.md need compilers, which apt installs: their
+/// absence is a failure here, and a skipped test elsewhere.
+fn test() -> Result<()> {
+    if cfg!(target_os = "linux") {
+        if !succeeds("avr-gcc", "--version") {
+            let as_root = if succeeds("sudo", "--version") { "sudo " } else { "" };
+            let install = format!("{as_root}apt-get install --yes --no-install-recommends gcc-avr avr-libc");
+            let (program, arguments) = install.split_once(' ').unwrap_or_default();
+            run(program, arguments).context("the tests need gcc-avr and avr-libc")?;
+        }
+        let mut command = Command::new("cargo");
+        return execute(
+            command.args(["test", "--workspace", "--locked"]).env("PLOTPLAN_REQUIRE_COMPILERS", "1"),
+        );
+    }
+    cargo("test --workspace --locked")
 }
 
 fn tidy() -> Result<()> {

@@ -258,12 +258,13 @@ pub enum PenActuator {
 }
 
 /// How a program is encoded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EncodeOptions {
     /// What moves the pen; the firmware's own default if `None`.
     pub pen_actuator: Option<PenActuator>,
-    /// Positions with the pen up and down, in the unit of the firmware; its own default if `None`.
-    pub pen_positions: Option<(i16, i16)>,
+    /// Positions with the pen up and down, in the unit of the firmware: mm of the Z axis,
+    /// whole units of a servo. Its own default if `None`.
+    pub pen_positions: Option<(f64, f64)>,
     /// Moves that every version of the firmware executes.
     pub legacy_moves: bool,
 }

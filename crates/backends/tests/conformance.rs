@@ -417,7 +417,7 @@ fn resume_after_the_step_counters_were_cleared() {
 
 #[test]
 fn ebb_lifts_with_the_programs_pen_setting_on_failure() {
-    let positions = Some((20_000, 9_000));
+    let positions = Some((20_000.0, 9_000.0));
     for (encode, lift) in [
         (EncodeOptions::default(), "SP,1,500\r"),
         (

@@ -101,7 +101,7 @@ fn write(
 fn written() -> Vec<(&'static str, String)> {
     let encode = EncodeOptions {
         pen_actuator: Some(PenActuator::Servo),
-        pen_positions: Some((40, 90)),
+        pen_positions: Some((40.0, 90.0)),
         legacy_moves: false,
     };
     let formats = backends::ALL.iter().filter(|backend| backend.format_help().is_some());

@@ -44,6 +44,7 @@ pub mod pipeline;
 pub mod quantity;
 pub mod replay;
 pub mod report;
+mod restart;
 mod same_ink;
 pub mod scene;
 pub mod settings;

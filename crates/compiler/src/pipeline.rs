@@ -2,15 +2,16 @@
 //!
 //! Start reading at [`compile`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use drawing::{Affine, Drawing, Pen, Point, Rect, Vec2};
-use kinematics::{JointPos, Machine};
+use kinematics::{Fault, JointPos, Machine};
 use plan::{Header, Limits, Motor};
 use planner::{PlacementOptions, PlanError, Settings, Surface, TimingLaw, Trajectory};
 use verify::Certificate;
 
 use crate::layout::{Crop, cropped};
+use crate::restart;
 use crate::same_ink::same_ink;
 
 /// The order in which strokes are drawn.
@@ -65,8 +66,8 @@ pub enum Step {
     Placing,
     /// Finding an order.
     Ordering,
-    /// Planning motion.
-    Planning,
+    /// Planning motion: strokes planned, strokes in all.
+    Planning(usize, usize),
     /// Replaying the plan: rows done, rows in all.
     Verifying(u64, u64),
 }
@@ -168,6 +169,36 @@ fn place_on(
     }
     let beyond_sheet_mm = planner::beyond_sheet_mm(surface, &drawing);
     Ok(Placed { placement, drawing, beyond_sheet_mm })
+}
+
+/// Plans the strokes in their order. A closed stroke that meets a joint limit starts elsewhere, where
+/// that helps.
+fn plan<'a>(
+    machine: &'a Machine,
+    mut drawing: Drawing,
+    settings: &Settings,
+    progress: &dyn Fn(Step),
+) -> Result<Trajectory<'a>, PlanError> {
+    let planned = |drawing: Drawing| {
+        planner::plan_with_progress(machine, drawing, settings, &|done, all| {
+            progress(Step::Planning(done, all));
+        })
+    };
+    if machine.mechanism().full_rotation().is_none() {
+        return planned(drawing);
+    }
+    let mut restarted = BTreeSet::new();
+    loop {
+        let planned = planned(drawing.clone());
+        let Err(PlanError::OutOfReach { stroke, source, .. }) = &planned else { return planned };
+        if !matches!(source.fault, Fault::JointLimit { .. }) || !restarted.insert(*stroke) {
+            return planned;
+        }
+        match restart::restarted(machine, &drawing.strokes[*stroke]) {
+            Some(other) => drawing.strokes[*stroke] = other,
+            None => return planned,
+        }
+    }
 }
 
 /// What a drawing is arranged for.
@@ -284,14 +315,14 @@ pub fn compile<'a>(
     };
     let strokes = ordered.strokes.len();
 
-    progress(Step::Planning);
+    progress(Step::Planning(0, strokes));
     let settings = Settings {
         pen_speeds_mm_s: request.pen_speeds.clone(),
         timing_law: request.timing_law,
         lift_overlap_s: request.lift_overlap_s,
         ..Settings::new(request.tolerance_mm, request.period_us)
     };
-    let trajectory = planner::plan(machine, ordered, &settings)?;
+    let trajectory = plan(machine, ordered, &settings, progress)?;
     let ordered = trajectory.drawing();
 
     let header = Header {

@@ -120,7 +120,7 @@ codes! {
     EMPTY_PARAMETER = 107 "H0107" Warning "empty parameter"
         "Two separators with nothing between them, or one before the first number. The language has no empty \
          parameters: the gap is skipped, and the numbers after it move up."
-    NUMBER_OUT_OF_RANGE = 108 "H0108" Error "number out of range"
+    NUMBER_OUT_OF_RANGE = 108 "H0108" Warning "number out of range"
         "A number of 2^30 or more in size. In a coordinate list the pair that it belongs to is left out, any other \
          command with such a number has no effect."
     LINE_END_IN_NUMBER = 109 "H0109" Warning "line end between digits"
@@ -152,7 +152,7 @@ codes! {
     ENCODED_WITHOUT_TERMINATOR = 117 "H0117" Warning "encoded polyline without terminator"
         "The data of PE end at a semicolon. Here another byte comes first that cannot be data; the polyline is ended \
          after its last whole number, and reading continues there."
-    ENCODED_DAMAGED = 118 "H0118" Error "damaged encoded polyline"
+    ENCODED_DAMAGED = 118 "H0118" Warning "damaged encoded polyline"
         "The data of PE hold an unfinished number, half a pair, or a number of fractional bits beyond 26. What is \
          whole is drawn, the rest is left out. A file that went through a 7-bit line or a text editor looks like \
          that."
@@ -170,12 +170,12 @@ codes! {
          file draws nothing else at all, see H0222."
     BAD_PARAMETERS = 203 "H0203" Warning "wrong parameters"
         "The command's parameters are too few, or not what it allows. It has no effect."
-    LOST_DRAWING_COMMAND = 204 "H0204" Error "drawing command with wrong parameters"
+    LOST_DRAWING_COMMAND = 204 "H0204" Warning "drawing command with wrong parameters"
         "A command that draws has too few parameters, or some that it does not allow. It is skipped, and its ink is \
          missing."
     ODD_COORDINATES = 206 "H0206" Warning "odd number of coordinates"
         "A coordinate list has an x without its y at the end. That x is skipped."
-    COORDINATE_OUT_OF_RANGE = 207 "H0207" Error "coordinate beyond all paper"
+    COORDINATE_OUT_OF_RANGE = 207 "H0207" Warning "coordinate beyond all paper"
         "After scaling, a point lies more than 25 km from the origin, or is no number at all. It is left out. The \
          scaling points (IP, IR) and the scale (SC) before it are the place to look."
     BAD_SCALE = 208 "H0208" Warning "impossible scale"
@@ -206,7 +206,7 @@ codes! {
          drawn by itself."
     EMPTY_POLYGON = 218 "H0218" Note "empty polygon"
         "EP or FP asks for a polygon, but the polygon buffer holds none."
-    UNKNOWN_CHARACTER = 220 "H0220" Error "character not drawn"
+    UNKNOWN_CHARACTER = 220 "H0220" Warning "character not drawn"
         "A character of a label or a symbol is not in the built-in stroke font, or its byte stands for none in the character \
          set. Its cell stays empty. The font has the Latin alphabets, Greek letters and the signs of the sets that \
          plotters knew; other scripts should be converted to outlines or strokes before."
@@ -216,7 +216,7 @@ codes! {
     ONLY_INK_WITHOUT_PEN = 222 "H0222" Warning "drawing without a pen throughout"
         "The file puts the pen away (SP0) and then draws all that it draws. On a plotter with pens in a carousel the \
          sheet would stay empty; what is meant is a pen that somebody put into the holder, so that pen 1 is taken."
-    TOO_MANY_PIECES = 223 "H0223" Error "pattern too fine"
+    TOO_MANY_PIECES = 223 "H0223" Warning "pattern too fine"
         "A hatch or a line pattern is so fine for the area or the line that it would come to millions of pieces. The \
          area is not filled, the line is drawn solid. As a rule the scale or the spacing is not what was meant."
     UNKNOWN_CHARACTER_SET = 224 "H0224" Note "character set not known"

@@ -1,6 +1,6 @@
 //! What a file consists of, and the plotter it was read for.
 
-use drawing::{Point, Rect};
+use drawing::{Pen, Point, Rect};
 
 use crate::mnemonic::Mnemonic;
 
@@ -15,6 +15,8 @@ pub struct Summary {
     pub wrappers: Wrappers,
     /// The plotter that it was read for.
     pub profile: Profile,
+    /// The pens that `PC` had made white when they drew, in the order of their numbers.
+    pub white_pens: Vec<Pen>,
 }
 
 impl Summary {

@@ -48,6 +48,13 @@ impl std::error::Error for Fault {}
 impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
+            Self::TooFar(by) if by < 0.005 => {
+                write!(f, "it is at the edge of the machine's reach, where the arm is stretched")
+            }
+            Self::TooNear(by) if by < 0.005 => write!(
+                f,
+                "the arm would have to fold completely, so that no line can pass through this point"
+            ),
             Self::TooFar(by) => write!(f, "it is {by:.2} mm beyond the machine's reach"),
             Self::TooNear(by) => write!(f, "it is {by:.2} mm too near to the machine's base"),
             Self::JointLimit { joint, kind, value, min, max } => {
@@ -60,7 +67,8 @@ impl std::fmt::Display for Fault {
             }
             Self::Singular { manipulability, min } => write!(
                 f,
-                "it is too close to a singularity (manipulability {manipulability:.3}, minimum {min:.3})"
+                "it is too close to a singularity (manipulability {manipulability:.3}, minimum {min:.3}: min_dexterity in \
+                 [geometry])"
             ),
         }
     }

@@ -12,4 +12,4 @@ pub mod scene;
 pub mod svg;
 
 pub use palette::{Colour, PenColors};
-pub use scene::{Ink, Scene};
+pub use scene::{Ink, InkLine, LEVELS, Scene, Shades};

@@ -7,11 +7,15 @@ use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, 
 
 use crate::palette::{Colour, colour_on_white};
 use crate::scene::{
-    DASH_MM, INK_MM, OUTLINE_MM, REACH_FILL, REACH_LINE, SHEET_LINE, START, Scene, TRAVEL, TRAVEL_MM,
+    DASH_MM, INK_MM, InkLine, OUTLINE_MM, REACH_FILL, REACH_LINE, SHEET_LINE, START, Scene, TRAVEL,
+    TRAVEL_MM, shade,
 };
 
 /// A picture's longer side has at most this many pixels, lest it need gigabytes.
 pub const LARGEST_PX: u32 = 8192;
+
+/// Chords of arcs and curves are this close to them, pixels: below what a pixel shows.
+const CHORD_PX: f64 = 0.25;
 
 /// Why a picture could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +44,9 @@ pub fn encode(scene: &Scene, longer_px: u32) -> Result<Vec<u8>, PngError> {
         let fill = paint(REACH_FILL);
         canvas.pixmap.fill_path(&reach, &fill, FillRule::EvenOdd, Transform::identity(), None);
     }
+    for (cell, level) in scene.shades.iter().flat_map(|shades| &shades.cells) {
+        canvas.fill(*cell, shade(*level));
+    }
     for outline in &scene.reach {
         canvas.line(outline, true, REACH_LINE, OUTLINE_MM, None);
     }
@@ -51,7 +58,13 @@ pub fn encode(scene: &Scene, longer_px: u32) -> Result<Vec<u8>, PngError> {
     }
     for pen in scene.pens() {
         for ink in scene.ink.iter().filter(|ink| ink.pen == pen) {
-            canvas.line(&ink.points, false, colour_on_white(pen, &scene.colors), INK_MM, None);
+            let colour = colour_on_white(pen, &scene.colors);
+            match &ink.line {
+                InkLine::Points(points) => canvas.line(points, false, colour, INK_MM, None),
+                InkLine::Stroke(stroke) => {
+                    canvas.line(&stroke.flatten(CHORD_PX / scale), false, colour, INK_MM, None);
+                }
+            }
         }
     }
     if let Some(start) = scene.start {
@@ -88,6 +101,17 @@ impl Canvas {
         }
         if closed {
             path.close();
+        }
+    }
+
+    fn fill(&mut self, rect: Rect, colour: Colour) {
+        let x = ((rect.x0 - self.bounds.x0) * self.scale) as f32;
+        let y = ((self.bounds.y1 - rect.y1) * self.scale) as f32;
+        let [width, height] = [rect.width(), rect.height()].map(|side| (side * self.scale) as f32);
+        if let Some(rect) = tiny_skia::Rect::from_xywh(x, y, width, height) {
+            // Without antialiasing no seam shows between neighbours.
+            let paint = Paint { anti_alias: false, ..paint(colour) };
+            self.pixmap.fill_rect(rect, &paint, Transform::identity(), None);
         }
     }
 

@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use drawing::{Point, Rect};
+use drawing::{Point, Rect, Stroke};
 
 use crate::palette::{Colour, PenColors, colour_on_white, hex};
-use crate::svg::{point, polyline, view_box};
+use crate::svg::{path, point, polyline, view_box};
 use plan::file::text::Text;
 
 pub(crate) const REACH_FILL: Colour = [0xEE, 0xF3, 0xF8];
@@ -13,6 +13,8 @@ pub(crate) const REACH_LINE: Colour = [0xA9, 0xB9, 0xC9];
 pub(crate) const SHEET_LINE: Colour = [0x55, 0x55, 0x55];
 pub(crate) const TRAVEL: Colour = [0x8C, 0x8C, 0x8C];
 pub(crate) const START: Colour = [0xB0, 0x00, 0x20];
+/// Shades from the smallest to the largest value: light to dark orange.
+const SHADES: [Colour; 2] = [[0xFF, 0xF4, 0xE0], [0xC8, 0x64, 0x00]];
 
 /// Widths and lengths in mm, for a page of any size: ink is as wide as a pen's, the rest is thinner.
 pub(crate) const INK_MM: f64 = 0.3;
@@ -29,6 +31,8 @@ pub struct Scene {
     pub sheet: Rect,
     /// Closed outlines of where the pen can go; what is inside an odd number of them can be reached.
     pub reach: Vec<Vec<Point>>,
+    /// A quantity over the workspace, below everything else.
+    pub shades: Option<Shades>,
     /// What is drawn, in its order.
     pub ink: Vec<Ink>,
     /// The pens' own colours.
@@ -44,8 +48,42 @@ pub struct Scene {
 pub struct Ink {
     /// The pen's number, 1 and up.
     pub pen: u16,
-    /// Its points, mm; a single point is a dot.
-    pub points: Vec<Point>,
+    /// Its path.
+    pub line: InkLine,
+}
+
+/// The path of ink.
+#[derive(Clone, Debug, PartialEq)]
+pub enum InkLine {
+    /// A polyline, mm; a single point is a dot.
+    Points(Vec<Point>),
+    /// A stroke, whose arcs and curves stay what they are.
+    Stroke(Stroke),
+}
+
+/// A quantity over the workspace as cells of equal value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shades {
+    /// What it is, with its unit: `tick floor, mm`.
+    pub title: String,
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+    /// Each cell with its level, from 0 (smallest) to [`LEVELS`] - 1.
+    pub cells: Vec<(Rect, usize)>,
+}
+
+/// Levels of shades.
+pub const LEVELS: usize = 8;
+
+/// The colour of a level of shade.
+pub(crate) fn shade(level: usize) -> Colour {
+    let share = level.min(LEVELS - 1) as f64 / (LEVELS - 1) as f64;
+    let [light, dark] = SHADES;
+    let mix = |channel: usize| {
+        let [a, b] = [light[channel], dark[channel]].map(f64::from);
+        (a + share * (b - a)).round() as u8
+    };
+    [mix(0), mix(1), mix(2)]
 }
 
 impl Scene {
@@ -60,9 +98,18 @@ impl Scene {
     /// The smallest upright rectangle that holds sheet, ink, travel and start, mm, and a margin; points that are not finite
     /// aside. The reach of an arm may go far beyond: what of it lies outside is not shown.
     pub fn bounds(&self) -> Rect {
-        let lines = self.travel.iter().chain(self.ink.iter().map(|ink| &ink.points));
-        let points = lines.flatten().chain(&self.start).filter(|point| point.is_finite());
-        let bounds = points.fold(self.sheet.abs(), |bounds, &point| bounds.union_pt(point));
+        let ink = self.ink.iter().flat_map(|ink| match &ink.line {
+            InkLine::Points(points) => points.clone(),
+            InkLine::Stroke(stroke) => {
+                let bounds = stroke.bounding_box();
+                vec![Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)]
+            }
+        });
+        let others = self.travel.iter().flatten().chain(&self.start).copied();
+        let points = ink.chain(others).filter(|point| point.is_finite());
+        let bounds = points.fold(self.sheet.abs(), |bounds, point| bounds.union_pt(point));
+        let cells = self.shades.iter().flat_map(|shades| &shades.cells);
+        let bounds = cells.fold(bounds, |bounds, (cell, _)| bounds.union(*cell));
         let margin = 1.0 + 0.02 * bounds.width().max(bounds.height());
         bounds.inflate(margin, margin)
     }
@@ -91,7 +138,11 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
         polyline(&mut text, outline)?;
         text.byte(b'Z');
     }
-    text.str("\"/>\n<rect id=\"sheet\"");
+    text.str("\"/>\n");
+    if let Some(shades) = &scene.shades {
+        write_shades(&mut text, shades)?;
+    }
+    text.str("<rect id=\"sheet\"");
     rectangle(&mut text, scene.sheet.abs());
     text.str(" stroke=\"").str(&hex(SHEET_LINE)).str("\" stroke-width=\"").fixed(OUTLINE_MM).str("\"/>\n");
 
@@ -104,9 +155,12 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
     for pen in scene.pens() {
         text.str("<g id=\"pen").int(pen).str("\" stroke=\"").str(&hex(colour_on_white(pen, &scene.colors)));
         text.str("\" stroke-width=\"").fixed(INK_MM).str("\">\n");
-        for ink in scene.ink.iter().filter(|ink| ink.pen == pen && !ink.points.is_empty()) {
+        for ink in scene.ink.iter().filter(|ink| ink.pen == pen) {
             text.str("<path d=\"");
-            polyline(&mut text, &ink.points)?;
+            match &ink.line {
+                InkLine::Points(points) => polyline(&mut text, points)?,
+                InkLine::Stroke(stroke) => path(&mut text, stroke)?,
+            }
             text.str("\"/>\n").flush_if_full()?;
         }
         text.str("</g>\n");
@@ -122,6 +176,24 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
     text.finish()
 }
 
+/// The cells, one path a level.
+fn write_shades<W: Write + ?Sized>(text: &mut Text<'_, W>, shades: &Shades) -> io::Result<()> {
+    text.str("<g id=\"shades\">\n");
+    for level in 0..LEVELS {
+        text.str("<path fill=\"").str(&hex(shade(level))).str("\" d=\"");
+        for (cell, _) in shades.cells.iter().filter(|(_, its)| *its == level) {
+            text.byte(b'M');
+            point(text, Point::new(cell.x0, cell.y1));
+            text.byte(b'h').fixed(cell.width()).byte(b'v').fixed(cell.height());
+            text.byte(b'h').fixed(-cell.width()).byte(b'Z');
+            text.flush_if_full()?;
+        }
+        text.str("\"/>\n");
+    }
+    text.str("</g>\n");
+    Ok(())
+}
+
 /// Text below the picture: the title, the sheet's size, and the pens with their colours.
 struct Legend {
     size_mm: f64,
@@ -134,7 +206,8 @@ impl Legend {
         let size_mm = bounds.width().max(bounds.height()) / 60.0;
         // A pen's entry is six letters wide with its line of colour.
         let pens_a_line = (bounds.width() / (6.0 * size_mm)).floor().max(1.0) as usize;
-        Self { size_mm, pens_a_line, lines: 2 + scene.pens().len().div_ceil(pens_a_line) }
+        let shades = usize::from(scene.shades.is_some());
+        Self { size_mm, pens_a_line, lines: 2 + shades + scene.pens().len().div_ceil(pens_a_line) }
     }
 
     fn height_mm(&self) -> f64 {
@@ -154,6 +227,9 @@ impl Legend {
         let tenths = |length: f64| (length * 10.0).round() / 10.0;
         text.str("sheet ").float(tenths(scene.sheet.width().abs())).str(" x ");
         text.float(tenths(scene.sheet.height().abs())).str(" mm</text>\n");
+        if let Some(shades) = &scene.shades {
+            self.write_shades(text, shades, Point::new(left, line(3)));
+        }
         for (index, pen) in scene.pens().into_iter().enumerate() {
             let at = Point::new(
                 left + 6.0 * self.size_mm * (index % self.pens_a_line) as f64,
@@ -169,6 +245,20 @@ impl Legend {
             text.str("pen ").int(pen).str("</text>\n");
         }
         text.str("</g>\n");
+    }
+
+    /// The levels as a row of squares, between the smallest and the largest value.
+    fn write_shades<W: Write + ?Sized>(&self, text: &mut Text<'_, W>, shades: &Shades, at: Point) {
+        for level in 0..LEVELS {
+            text.str("<rect fill=\"").str(&hex(shade(level))).str("\"");
+            let corner = at + (self.size_mm * level as f64, 0.0);
+            rectangle(text, Rect::from_points(corner, corner + (self.size_mm, self.size_mm)));
+            text.str("/>\n");
+        }
+        label(text, at + (self.size_mm * (LEVELS as f64 + 0.7), 0.0));
+        escaped(text, &shades.title);
+        let [low, high] = shades.range.map(|value| (value * 1e4).round() / 1e4);
+        text.str(": ").float(low).str(" (light) to ").float(high).str(" (dark)</text>\n");
     }
 }
 

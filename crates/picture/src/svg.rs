@@ -90,7 +90,7 @@ pub(crate) fn polyline<W: Write + ?Sized>(text: &mut Text<'_, W>, points: &[Poin
     Ok(())
 }
 
-fn path<W: Write + ?Sized>(text: &mut Text<'_, W>, stroke: &Stroke) -> io::Result<()> {
+pub(crate) fn path<W: Write + ?Sized>(text: &mut Text<'_, W>, stroke: &Stroke) -> io::Result<()> {
     text.byte(b'M');
     point(text, stroke.start());
     if stroke.is_dot() {

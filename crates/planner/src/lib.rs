@@ -68,7 +68,7 @@ pub use error::PlanError;
 pub use placement::{Mirror, PlacementOptions, Scale, Surface, beyond_sheet_mm, place};
 pub use settings::{Settings, TimingLaw};
 pub use time_parametrization::{Easing, LimitingConstraints};
-pub use trajectory::{ExactRow, Rows, Times, Trajectory, check_reach, plan};
+pub use trajectory::{ExactRow, Rows, Times, Trajectory, check_reach, plan, plan_with_progress};
 pub use travel::{travel_pose, travel_time};
 
 /// The planner's stages one by one, for benchmarks, reference tests and pictures. No stability is

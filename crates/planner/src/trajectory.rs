@@ -101,6 +101,19 @@ pub fn plan<'a>(
     drawing: Drawing,
     settings: &Settings,
 ) -> Result<Trajectory<'a>, PlanError> {
+    plan_with_progress(machine, drawing, settings, &|_, _| {})
+}
+
+/// As [`plan`]; `progress` is called with the strokes planned and all strokes, after each batch.
+///
+/// # Errors
+/// Those of [`plan`].
+pub fn plan_with_progress<'a>(
+    machine: &'a Machine,
+    drawing: Drawing,
+    settings: &Settings,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Trajectory<'a>, PlanError> {
     settings::check(settings)?;
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
@@ -121,7 +134,14 @@ pub fn plan<'a>(
         (0, 1, Times::default(), LimitingConstraints::default());
     let (mut cached, mut phases) = (Some(Vec::new()), 0);
     let mut motions = trajectory.motions();
+    let mut reported = 0;
     while let Some(motion) = motions.next_motion()? {
+        // Batches are planned ahead of the motion that is taken.
+        let planned = motions.next;
+        if planned != reported {
+            reported = planned;
+            progress(planned, trajectory.drawing.strokes.len());
+        }
         let time = motion.periods() as f64 * period;
         match &motion {
             Motion::Pen { .. } => times.lifting_s += time,

@@ -17,10 +17,44 @@ use compiler::{import, quantity};
 /// `plotplan convert drawing.hpgl --machine coaxial` writes the plan to standard output: a table of motor ticks against
 /// time, certified to draw the drawing within a tolerance and inside the motors' limits.
 #[derive(Debug, Parser)]
-#[command(name = "plotplan", version = env!("PLOTPLAN_VERSION"), max_term_width = 100)]
+#[command(name = "plotplan", version = env!("PLOTPLAN_VERSION"), max_term_width = 100, after_help = exit_codes())]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) messages: Messages,
+}
+
+/// How every command reports.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Messages")]
+pub(crate) struct Messages {
+    /// How to report: `json` is one object on the last line, also on failure (docs/reports.md)
+    #[arg(long, value_enum, global = true, default_value_t = ReportForm::Text)]
+    pub(crate) report: ReportForm,
+    /// How to write diagnostics, warnings and errors to standard error
+    #[arg(long, value_enum, global = true, value_name = "FORM", default_value_t = MessageFormat::Human)]
+    pub(crate) message_format: MessageFormat,
+    /// Print errors only
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+    /// Print all diagnostics, not only the first five of a kind
+    #[arg(long, global = true)]
+    pub(crate) all: bool,
+    /// Colour in messages; `auto` is colour on a terminal, unless NO_COLOR is set
+    #[arg(long, value_enum, global = true, value_name = "WHEN", default_value_t = Color::Auto)]
+    pub(crate) color: Color,
+}
+
+/// When messages have colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Color {
+    /// On a terminal, unless NO_COLOR is set
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
 }
 
 impl Arguments {
@@ -55,6 +89,8 @@ pub(crate) enum Command {
     Machine(Machine),
     /// Explain a diagnostic's code
     Explain(Explain),
+    /// Print the JSON schema of reports (--report json)
+    Schema(Schema),
     /// Print a completion script for a shell
     Completions(Completions),
     /// Print the manual page of plotplan or of one of its commands
@@ -93,9 +129,6 @@ pub(crate) struct Convert {
     pub(crate) planning: Planning,
     #[command(flatten)]
     pub(crate) reading: Reading,
-    /// How to report on standard error
-    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
-    pub(crate) report: ReportForm,
 }
 
 impl Convert {
@@ -138,9 +171,10 @@ pub(crate) struct PenLift {
     /// For G-code: what moves the pen. For ebb: `servo` uses S2 instead of SP
     #[arg(long, value_name = "HOW", value_enum)]
     pub(crate) pen_by: Option<PenBy>,
-    /// Positions with the pen up and down: S or degrees of a servo, mm of Z, 1/12 microseconds for ebb
+    /// Positions with the pen up and down: S or degrees of a servo, mm of Z (such as 5,-0.5), 1/12 microseconds for
+    /// ebb
     #[arg(long, value_name = "UP,DOWN", value_parser = positions, allow_hyphen_values = true)]
-    pub(crate) pen_positions: Option<(i16, i16)>,
+    pub(crate) pen_positions: Option<(f64, f64)>,
 }
 
 /// What moves the pen.
@@ -153,6 +187,17 @@ pub(crate) enum PenBy {
 }
 
 impl PenLift {
+    /// Why the positions cannot be used: only the Z axis takes fractions and numbers below 0.
+    pub(crate) fn wrong_positions(self) -> Option<String> {
+        let (up, down) = self.pen_positions?;
+        let is_whole = |value: f64| value.fract() == 0.0 && value >= 0.0;
+        (self.pen_by != Some(PenBy::Z) && !(is_whole(up) && is_whole(down))).then(|| {
+            format!(
+                "--pen-positions {up},{down}: a servo takes whole numbers from 0; with --pen-by z they are mm"
+            )
+        })
+    }
+
     /// The same for an encoder.
     pub(crate) fn encode_options(self) -> EncodeOptions {
         let pen_actuator = self.pen_by.map(|by| match by {
@@ -166,9 +211,10 @@ impl PenLift {
 /// How a drawing's file is read.
 #[derive(Debug, Args)]
 pub(crate) struct Reading {
-    /// Which page of the file to take, from 1; with `convert`, `all` writes one file for each page
-    #[arg(long, value_name = "N|all", default_value = "1", value_parser = page)]
-    pub(crate) page: PageChoice,
+    /// Which page of the file to take, from 1; with `convert`, `all` writes one file for each page [default: the first,
+    /// with a warning if there are more]
+    #[arg(long, value_name = "N|all", value_parser = page)]
+    pub(crate) page: Option<PageChoice>,
     /// Plotter that the file was made for (see `plotplan explain plotters`) [default: from the file]. With `convert --format
     /// hpgl`: the plotter to write for, or a TOML file with its limits
     #[arg(long, value_name = "NAME")]
@@ -179,6 +225,9 @@ pub(crate) struct Reading {
     /// The sheet on the machine: A4, A3,landscape, letter or 200x300mm. With --plotter: the paper of that plotter
     #[arg(long, value_name = "PAPER")]
     pub(crate) paper: Option<String>,
+    /// HP-GL: draw the ink of pens that the file makes white (PC), or leave it out
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = WhitePens::Draw)]
+    pub(crate) white_pens: WhitePens,
     /// SVG: how pens are numbered
     #[arg(long, value_enum, default_value_t = Pens::Layers)]
     pub(crate) pens: Pens,
@@ -193,9 +242,6 @@ pub(crate) struct Reading {
     pub(crate) dpi: Option<f64>,
     #[command(flatten)]
     pub(crate) layout: Layout,
-    /// How to write diagnostics to standard error
-    #[arg(long, value_enum, default_value_t = MessageFormat::Human)]
-    pub(crate) message_format: MessageFormat,
     /// Treat warnings as errors
     #[arg(long)]
     pub(crate) strict: bool,
@@ -243,6 +289,11 @@ impl Layout {
 }
 
 impl Reading {
+    /// The page to take; the first unless another one was asked for.
+    pub(crate) fn page(&self) -> PageChoice {
+        self.page.unwrap_or(PageChoice::Number(1))
+    }
+
     /// The options of the drawing's importer.
     pub(crate) fn options(&self) -> import::Options {
         let made_for = self.made_for.as_ref().map(|text| match text.split_once(',') {
@@ -254,6 +305,7 @@ impl Reading {
         import::Options {
             plotter,
             paper: paper.flatten(),
+            skip_white_pens: self.white_pens == WhitePens::Skip,
             svg: import::SvgOptions {
                 pens: match self.pens {
                     Pens::Layers => import::PenRule::Layers,
@@ -266,6 +318,15 @@ impl Reading {
             },
         }
     }
+}
+
+/// What is done with the ink of white pens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WhitePens {
+    /// It is drawn, with a warning
+    Draw,
+    /// It is left out
+    Skip,
 }
 
 /// How the pens of an SVG file are numbered.
@@ -414,9 +475,6 @@ pub(crate) struct Verify {
     pub(crate) tolerance: Option<f64>,
     #[command(flatten)]
     pub(crate) reading: Reading,
-    /// How to report
-    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
-    pub(crate) report: ReportForm,
 }
 
 #[derive(Debug, Args)]
@@ -424,9 +482,12 @@ pub(crate) struct Preview {
     /// Plan, or drawings, which are drawn over each other; `-` for standard input
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<String>,
-    /// Picture to write: NAME.svg or NAME.png
+    /// Picture to write: NAME.svg or NAME.png; `-` for standard output
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: String,
+    /// Format of the picture [default: by the extension of --output; svg on standard output]
+    #[arg(short, long, value_enum)]
+    pub(crate) format: Option<PictureFormat>,
     /// The machine to show it on; a plan knows its own
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
@@ -434,6 +495,15 @@ pub(crate) struct Preview {
     pub(crate) reading: Reading,
     #[command(flatten)]
     pub(crate) planning: Planning,
+}
+
+/// The format of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PictureFormat {
+    /// Scalable, one unit is one mm
+    Svg,
+    /// Pixels, 1600 along the longer side
+    Png,
 }
 
 #[derive(Debug, Args)]
@@ -585,12 +655,30 @@ pub(crate) enum Machine {
         /// Machine file, or the name of a preset
         file: String,
     },
+    /// Draw a picture of a machine: reach, sheet, start pose, and its resolution as shades
+    Preview {
+        /// Name of a preset, or a machine file
+        name: String,
+        /// Picture to write: NAME.svg or NAME.png; `-` for standard output
+        #[arg(short, long, value_name = "OUT")]
+        output: String,
+        /// Format of the picture [default: by the extension of --output; svg on standard output]
+        #[arg(short, long, value_enum)]
+        format: Option<PictureFormat>,
+    },
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Explain {
     /// The code, such as H0101; or `plotters` for the plotters and papers that are known
     pub(crate) code: String,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Schema {
+    /// Print the page docs/reports.md instead
+    #[arg(long)]
+    pub(crate) markdown: bool,
 }
 
 #[derive(Debug, Args)]
@@ -690,7 +778,7 @@ impl ValueEnum for Format {
 pub(crate) enum ReportForm {
     /// For people
     Text,
-    /// One JSON object on the last line
+    /// One JSON object on the last line, see docs/reports.md
     Json,
 }
 
@@ -724,6 +812,43 @@ pub(crate) enum Speed {
     Machine,
     /// The file's (VS) where it gives one, and never more than the machine's
     File,
+}
+
+/// The table of exit codes, for the help of the program.
+fn exit_codes() -> String {
+    let line =
+        |exit: &compiler::report::ExitCode| format!("  {:<4} {}: {}", exit.code, exit.name, exit.meaning);
+    let lines: Vec<String> = compiler::report::EXIT_CODES.iter().map(line).collect();
+    format!("Exit codes:\n{}", lines.join("\n"))
+}
+
+impl Command {
+    /// The name as it is typed: `convert`, `machine check`.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Convert(_) => "convert",
+            Self::Check(_) => "check",
+            Self::Info(_) => "info",
+            Self::Verify(_) => "verify",
+            Self::Preview(_) => "preview",
+            Self::Send(_) => "send",
+            #[cfg(unix)]
+            Self::Emulate(_) => "emulate",
+            Self::Machine(Machine::List) => "machine list",
+            Self::Machine(Machine::Show { .. }) => "machine show",
+            Self::Machine(Machine::Check { .. }) => "machine check",
+            Self::Machine(Machine::Preview { .. }) => "machine preview",
+            Self::Explain(_) => "explain",
+            Self::Schema(_) => "schema",
+            Self::Completions(_) => "completions",
+            Self::Man(_) => "man",
+        }
+    }
+}
+
+/// Whether standard output holds the report itself, so that its JSON form goes there.
+pub(crate) fn reports_on_stdout(command: &str) -> bool {
+    ["check", "info", "verify", "machine check", "machine list"].contains(&command)
 }
 
 fn align(text: &str) -> Result<(f64, f64), String> {
@@ -819,9 +944,13 @@ fn dpi(text: &str) -> Result<f64, String> {
     dpi.ok_or_else(|| format!("{text} is not a number from 1 to 100000"))
 }
 
-fn positions(text: &str) -> Result<(i16, i16), String> {
-    let (up, down) = text.split_once(',').ok_or("two whole numbers with a comma between, such as 40,90")?;
-    let number = |text: &str| text.trim().parse().map_err(|_| format!("{text} is not a whole number"));
+fn positions(text: &str) -> Result<(f64, f64), String> {
+    let (up, down) =
+        text.split_once(',').ok_or("expected two numbers with a comma between, such as 40,90")?;
+    let number = |text: &str| {
+        let value = text.trim().parse::<f64>().ok().filter(|value| value.abs() <= 30_000.0);
+        value.ok_or_else(|| format!("{text} is not a number between -30000 and 30000"))
+    };
     Ok((number(up)?, number(down)?))
 }
 
@@ -858,8 +987,7 @@ fn place(text: &str) -> Result<(f64, f64), String> {
 }
 
 /// Options that choose files or the form of reports: the plan does not depend on them.
-const NOT_OF_THE_PLAN: [&str; 7] =
-    ["files", "machine", "output", "format", "report", "message_format", "strict"];
+const NOT_OF_THE_PLAN: [&str; 5] = ["files", "machine", "output", "format", "strict"];
 
 /// The options of `convert` that shape the plan, as given, in the order of the help: with them, the
 /// same drawing and the same machine, `convert` makes the same plan.

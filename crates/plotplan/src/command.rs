@@ -53,6 +53,14 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
             let text = format!("{title}\n\n{explanation}\n");
             output::write("-", |out| out.write_all(text.as_bytes()))
         }
+        Command::Schema(schema) => {
+            let text = if schema.markdown {
+                compiler::report::page::markdown()
+            } else {
+                format!("{:#}\n", compiler::report::page::schema())
+            };
+            output::write("-", |out| out.write_all(text.as_bytes()))
+        }
         Command::Completions(completions) => output::write("-", |out| {
             clap_complete::generate(completions.shell, &mut Arguments::command(), "plotplan", &mut &mut *out);
             Ok(())

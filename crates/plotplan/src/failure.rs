@@ -2,14 +2,19 @@
 
 use std::process::ExitCode;
 
-use crate::terminal;
+use compiler::import::ImportError;
+use compiler::machine_file::MachineFileError;
+use compiler::report::{Code, ErrorReport, Place};
+use planner::PlanError;
+
+use crate::{cli, machines, session, terminal};
 
 /// Why a command stops.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The drawing cannot be planned, or a certificate does not hold: exit 1. Already reported.
+    /// The failure was reported with [`terminal::error`] or [`terminal::at_place`]; exit by its code.
     Refused,
-    /// The drawing cannot be planned: exit 1.
+    /// The drawing or plan cannot be used: exit 1.
     Drawing(anyhow::Error),
     /// The command line or a machine file is wrong: exit 2.
     Usage(anyhow::Error),
@@ -22,32 +27,6 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Reports the failure and returns the exit code.
-    pub(crate) fn report(self) -> ExitCode {
-        let (code, error) = match self {
-            Self::ClosedPipe => return ExitCode::SUCCESS,
-            Self::Refused => return ExitCode::from(1),
-            Self::Interrupted => return ExitCode::from(130),
-            Self::Drawing(error) => (1, error),
-            Self::Usage(error) => (2, error),
-            Self::Io(error) => (3, error),
-        };
-        terminal::error(&format!("{error:#}"));
-        ExitCode::from(code)
-    }
-
-    /// Reports the failure of one of several outputs, which does not end the command.
-    pub(crate) fn describe(self, name: &str) {
-        match self {
-            Self::ClosedPipe | Self::Refused | Self::Interrupted => {}
-            Self::Drawing(error) | Self::Usage(error) | Self::Io(error) => {
-                let text = format!("{error:#}");
-                let is_named = text.contains(name) || name.ends_with(text.split(':').next().unwrap_or(""));
-                terminal::error(&if is_named { text } else { format!("{name}: {text}") });
-            }
-        }
-    }
-
     /// A failure to write to `to`.
     pub(crate) fn writing(error: std::io::Error, to: &str) -> Self {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
@@ -56,4 +35,103 @@ impl Failure {
             Self::Io(anyhow::Error::new(error).context(format!("cannot write {to}")))
         }
     }
+
+    /// Reports the failure of one of several outputs, which does not end the command.
+    pub(crate) fn describe(self, name: &str) {
+        let (code, error) = match self {
+            Self::ClosedPipe | Self::Refused | Self::Interrupted => return,
+            Self::Drawing(error) => (kind_of(&error).unwrap_or(Code::Drawing), error),
+            Self::Usage(error) => (usage_kind(&error), error),
+            Self::Io(error) => (Code::Io, error),
+        };
+        let text = format!("{error:#}");
+        let is_named = text.contains(name) || name.ends_with(text.split(':').next().unwrap_or(""));
+        terminal::error_of_one(code, &if is_named { text } else { format!("{name}: {text}") });
+    }
+
+    /// Prints and records the failure, unless that was done already; returns the exit code.
+    fn report(self) -> u8 {
+        let (code, error) = match self {
+            Self::ClosedPipe => return 0,
+            Self::Refused => return session::failure().map_or(1, Code::exit_code),
+            Self::Interrupted => {
+                let message = "interrupted".to_owned();
+                session::failed(ErrorReport { code: Code::Interrupted, message, help: None, place: None });
+                return 130;
+            }
+            Self::Drawing(error) => (kind_of(&error).unwrap_or(Code::Drawing), error),
+            Self::Usage(error) => (usage_kind(&error), error),
+            Self::Io(error) => (Code::Io, error),
+        };
+        terminal::error_at(code, &format!("{error:#}"), place_of(&error));
+        code.exit_code()
+    }
+}
+
+/// Ends the program: prints the failure and the report.
+pub(crate) fn finish(result: Result<(), Failure>) -> ExitCode {
+    let code = match result {
+        Ok(()) => 0,
+        Err(Failure::ClosedPipe) => return ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    };
+    if session::is_json() {
+        write_report(code);
+    }
+    ExitCode::from(code)
+}
+
+/// Writes the report as a line of JSON.
+pub(crate) fn write_report(exit_code: u8) {
+    let Some((command, line)) = session::end(exit_code) else { return };
+    if cli::reports_on_stdout(&command) {
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), "{line}");
+    } else {
+        terminal::always(&format!("{line}\n"));
+    }
+}
+
+/// The kind of a failure of a drawing or plan, by its cause.
+fn kind_of(error: &anyhow::Error) -> Option<Code> {
+    error.chain().find_map(|cause| {
+        if let Some(error) = cause.downcast_ref::<PlanError>() {
+            return Some(match error {
+                PlanError::OutOfReach { .. } => Code::OutOfReach,
+                PlanError::NoInk => Code::NoInk,
+                PlanError::NoPlacement { .. } => Code::NoPlacement,
+                PlanError::TooManyRows { .. } => Code::TooLong,
+                PlanError::Setting { .. } => Code::Usage,
+            });
+        }
+        if cause.is::<ImportError>() {
+            return Some(Code::Foreign);
+        }
+        if cause.is::<plan::file::ReadError>() {
+            return Some(Code::NotAPlan);
+        }
+        let is_format = cause.is::<backends::WriteError>()
+            || cause.is::<backends::ProgramError>()
+            || cause.is::<backends::Unrepresentable>();
+        is_format.then_some(Code::Format)
+    })
+}
+
+/// Whether the command line or the machine file is wrong.
+fn usage_kind(error: &anyhow::Error) -> Code {
+    if error.chain().any(|cause| cause.is::<MachineFileError>()) { Code::MachineFile } else { Code::Usage }
+}
+
+/// The line of a machine file that a message is about.
+fn place_of(all: &anyhow::Error) -> Option<Place> {
+    let file = all.chain().find_map(|cause| cause.downcast_ref::<MachineFileError>())?;
+    let MachineFileError::Syntax(error) = file else { return None };
+    let line = error.line.as_ref().map(|(line, _)| *line);
+    let file = error_name(all);
+    line.map(|line| Place { file, line: Some(line), ..Place::default() })
+}
+
+/// The machine that cannot be used, as given.
+fn error_name(error: &anyhow::Error) -> String {
+    error.downcast_ref::<machines::Unusable>().map_or_else(String::new, |unusable| unusable.name.clone())
 }

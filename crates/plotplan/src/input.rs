@@ -9,16 +9,19 @@ use anyhow::Context as _;
 use compiler::import::{self, Document, ImportError, Page, Severity};
 use compiler::layout::{self, ColorConflict, Crop};
 use compiler::pipeline::Target;
-use compiler::report::text;
+use compiler::report::{Code, ErrorReport, Place, text};
 use drawing::{Drawing, Span};
 
 use crate::cli::{self, PageChoice};
 use crate::failure::Failure;
-use crate::terminal;
+use crate::{session, terminal};
 
 /// A file's bytes and what to call it.
 pub(crate) struct Input {
+    /// Its base name: a plan must not depend on the folder of the drawing.
     pub(crate) name: String,
+    /// The path as given, for messages and reports.
+    pub(crate) path: String,
     pub(crate) bytes: Vec<u8>,
 }
 
@@ -64,6 +67,7 @@ pub(crate) fn same_as(output: &Path) -> Option<String> {
 
 /// Reads a file, or standard input for `-`.
 pub(crate) fn read(file: &str) -> Result<Input, Failure> {
+    session::report(|report| report.inputs.push(file.to_owned()));
     if file == "-" {
         let mut bytes = Vec::new();
         std::io::stdin()
@@ -71,13 +75,12 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
             .read_to_end(&mut bytes)
             .context("cannot read standard input")
             .map_err(Failure::Io)?;
-        return Ok(Input { name: "standard input".into(), bytes });
+        return Ok(Input { name: "standard input".into(), path: "standard input".into(), bytes });
     }
     let bytes =
         read_file(Path::new(file)).with_context(|| format!("cannot read {file}")).map_err(Failure::Io)?;
-    // The base name only: a plan must not depend on the folder of the drawing.
     let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy().into_owned());
-    Ok(Input { name, bytes })
+    Ok(Input { name, path: file.to_owned(), bytes })
 }
 
 /// The files of a drawing, one or several that are drawn over each other.
@@ -108,6 +111,12 @@ impl Inputs {
         names.join(" + ")
     }
 
+    /// The files' paths as given, for messages.
+    pub(crate) fn path(&self) -> String {
+        let paths: Vec<&str> = self.0.iter().map(|input| &*input.path).collect();
+        paths.join(" + ")
+    }
+
     /// SHA-256 of the files' bytes, one after the other.
     pub(crate) fn sha256(&self) -> String {
         match &self.0[..] {
@@ -129,9 +138,6 @@ impl Inputs {
         (last, Span { start: span.start.saturating_sub(offset), end: span.end.saturating_sub(offset) })
     }
 }
-
-/// Why `--strict` refuses.
-pub(crate) const STRICT: &str = "stopping because of warnings (--strict)";
 
 /// A drawing's file, read, and the page that was asked for.
 pub(crate) struct LoadedDrawing {
@@ -177,7 +183,7 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     if let Some(input) = inputs.single() {
         return drawing(input, arguments);
     }
-    if arguments.page == PageChoice::All {
+    if arguments.page() == PageChoice::All {
         let what = "--page all takes one drawing, or a folder as --output";
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }
@@ -196,13 +202,14 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     let (mut page, conflicts) = layout::overlay(pages);
     for ColorConflict { pen, kept, lost, page } in conflicts {
         let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
-        terminal::warning(&format!(
+        let what = format!(
             "pen {} is {} in {} but {} before: it keeps the first colour",
             pen.0,
             hex(lost),
-            inputs.0[page].name,
+            inputs.0[page].path,
             hex(kept)
-        ));
+        );
+        terminal::warning(Code::PenColors, &what);
     }
     layout.apply_copies(&mut page.drawing);
     let size = format!("{} files", inputs.0.len());
@@ -217,32 +224,82 @@ fn load(
     options: &import::Options,
 ) -> Result<LoadedDrawing, Failure> {
     if plan::file::is_plan(&input.bytes) {
-        let what = format!("{} is a plan, not a drawing", input.name);
-        return Err(Failure::Drawing(anyhow::anyhow!(what)));
+        terminal::error(Code::Foreign, &format!("{} is a plan, not a drawing", input.path));
+        return Err(Failure::Refused);
     }
     let document = import::read(&input.bytes, options).map_err(|error| match error {
         ImportError::Foreign { .. } => {
-            Failure::Drawing(anyhow::Error::new(error).context(input.name.clone()))
+            Failure::Drawing(anyhow::Error::new(error).context(input.path.clone()))
         }
         _ => Failure::Usage(error.into()),
     })?;
-    terminal::diagnostics(input, &document.diagnostics, arguments.message_format);
+    terminal::diagnostics(input, &document.diagnostics);
     let pages = document.pages.len();
-    let page = match arguments.page {
+    let page = match arguments.page() {
         PageChoice::All => 1,
         PageChoice::Number(number) => number,
     };
     if page == 0 || page > pages {
         let have = text::pluralize(pages, "page");
-        let what = format!("{} has {have}, not page {page}", input.name);
+        let what = format!("{} has {have}, not page {page}", input.path);
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }
-    if arguments.strict && document.has(Severity::Warning) {
-        terminal::error(STRICT);
+    check_pens(input, &document, arguments)?;
+    refuse_warnings(arguments.strict)?;
+    Ok(LoadedDrawing { document, page: page - 1 })
+}
+
+/// Stops here if the reader reported an error, or the file draws nothing.
+pub(crate) fn refuse_unusable(name: &str, document: &Document) -> Result<(), Failure> {
+    if let Some(found) = document.diagnostics.iter().find(|found| found.severity == Severity::Error) {
+        let place = Place {
+            file: name.to_owned(),
+            byte: Some(found.span.start),
+            end: Some(found.span.end),
+            line: found.line_column.map(|[line, _]| line),
+            ..Place::default()
+        };
+        let (message, help) = (format!("{}: {}", found.code, found.message), found.help.clone());
+        session::failed(ErrorReport { code: Code::Drawing, message, help, place: Some(place) });
         return Err(Failure::Refused);
     }
-    check_pens(input, &document, arguments)?;
-    Ok(LoadedDrawing { document, page: page - 1 })
+    if document.pages.iter().all(|page| page.drawing.is_empty()) {
+        terminal::error(Code::NoInk, &format!("{name} draws nothing"));
+        return Err(Failure::Refused);
+    }
+    Ok(())
+}
+
+/// Stops here because of a warning, if that is asked for.
+pub(crate) fn refuse_warnings(strict: bool) -> Result<(), Failure> {
+    if strict && session::has_warning() {
+        terminal::error(Code::Strict, "stopping because of warnings (--strict)");
+        return Err(Failure::Refused);
+    }
+    Ok(())
+}
+
+/// Stops if the drawing cannot be used. Warns that one of several pages is taken, unless it was asked for.
+pub(crate) fn use_page(
+    inputs: &Inputs,
+    drawn: &LoadedDrawing,
+    arguments: &cli::Reading,
+) -> Result<(), Failure> {
+    refuse_unusable(&inputs.path(), &drawn.document)?;
+    let pages = drawn.document.pages.len();
+    match arguments.page {
+        _ if pages == 1 => {}
+        None => {
+            let what = format!("{} has {pages} pages; this is page 1, --page takes another", inputs.path());
+            terminal::warning(Code::SeveralPages, &what);
+        }
+        Some(PageChoice::Number(page)) => {
+            let what = format!("{} has {pages} pages; this is page {page}", inputs.path());
+            terminal::note(Code::SeveralPages, &what);
+        }
+        Some(PageChoice::All) => {}
+    }
+    refuse_warnings(arguments.strict)
 }
 
 /// Reports pens of `--only-pens` and `--pen-map` that the drawing does not have. Refuses a selection
@@ -255,7 +312,7 @@ fn check_pens(input: &Input, document: &Document, arguments: &cli::Reading) -> R
     }
     let list = |pens: &[u16]| pens.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
     let have =
-        || format!("{} draws with pens {}", input.name, list(&pens.iter().copied().collect::<Vec<_>>()));
+        || format!("{} draws with pens {}", input.path, list(&pens.iter().copied().collect::<Vec<_>>()));
     let only = arguments.layout.only_pens.as_deref().unwrap_or_default();
     if !only.is_empty() && !only.iter().any(|pen| pens.contains(pen)) {
         let what = format!("--only-pens {} leaves nothing: {}", list(only), have());
@@ -266,7 +323,7 @@ fn check_pens(input: &Input, document: &Document, arguments: &cli::Reading) -> R
         only.iter().copied().chain(mapped).filter(|pen| !pens.contains(pen)).collect();
     if !missing.is_empty() {
         let missing: Vec<u16> = missing.into_iter().collect();
-        terminal::warning(&format!("no stroke has pen {}: {}", list(&missing), have()));
+        terminal::warning(Code::PenMissing, &format!("no stroke has pen {}: {}", list(&missing), have()));
     }
     Ok(())
 }

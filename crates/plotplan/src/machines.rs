@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use compiler::machine_file::{MachineFile, PRESETS, nearest};
 use compiler::paper;
+use compiler::report::{ListedMachine, MachineSource};
 use kinematics::Machine;
 
 use crate::failure::Failure;
@@ -16,10 +17,18 @@ pub(crate) struct LoadedMachine {
     pub(crate) machine: Machine,
 }
 
+/// A machine that cannot be used, as the context of the reason.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("machine {name} cannot be used")]
+pub(crate) struct Unusable {
+    /// Its name or file, as given.
+    pub(crate) name: String,
+}
+
 /// The machine that `--machine` names: a preset, or a machine file.
 pub(crate) fn machine(name: &str) -> Result<LoadedMachine, Failure> {
     let toml = machine_toml(name)?;
-    let wrong = || format!("machine {name} cannot be used");
+    let wrong = || Unusable { name: name.to_owned() };
     let file = MachineFile::parse(&toml).with_context(wrong).map_err(Failure::Usage)?;
     let machine = file.machine().with_context(wrong).map_err(Failure::Usage)?;
     Ok(LoadedMachine { file, machine })
@@ -42,6 +51,38 @@ pub(crate) fn with_paper(machine: LoadedMachine, reading: &cli::Reading) -> Resu
             .map_err(Failure::Usage)?;
     }
     Ok(LoadedMachine { file, machine })
+}
+
+/// All machines that can be named: the presets, then the user's own.
+pub(crate) fn listed() -> Vec<ListedMachine> {
+    let own = own_machine_files();
+    let hidden = |name: &str| own.iter().any(|(own, _)| own == name);
+    let presets = PRESETS.iter().filter(|preset| !hidden(preset.name)).map(|preset| ListedMachine {
+        name: preset.name.to_owned(),
+        source: MachineSource::Preset,
+        about: preset.about.to_owned(),
+        error: None,
+        hides_preset: false,
+    });
+    let mut all: Vec<ListedMachine> = presets.collect();
+    all.extend(own.iter().map(|(name, path)| ListedMachine {
+        name: name.clone(),
+        source: MachineSource::Own,
+        about: path.display().to_string(),
+        error: unusable(path),
+        hides_preset: PRESETS.iter().any(|preset| preset.name == name),
+    }));
+    all
+}
+
+/// Why a machine file cannot be used.
+fn unusable(path: &Path) -> Option<String> {
+    let toml = match text(path) {
+        Ok(toml) => toml,
+        Err(error) => return Some(error.to_string()),
+    };
+    let machine = MachineFile::parse(&toml).and_then(|file| file.machine());
+    machine.err().map(|error| format!("{:#}", anyhow::Error::new(error)))
 }
 
 fn text(path: &Path) -> std::io::Result<String> {

@@ -32,11 +32,12 @@ const ORDERING: [&str; 3] = ["effort", "keep_direction", "pen_order"];
 /// Options of the firmware's pen.
 const PEN: [&str; 2] = ["pen_by", "pen_positions"];
 /// Options of the reader of a drawing.
-const READING: [&str; 13] = [
+const READING: [&str; 14] = [
     "page",
     "plotter",
     "made_for",
     "paper",
+    "white_pens",
     "pens",
     "hatch",
     "outline_fills",
@@ -191,7 +192,7 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 34] = [
+    const VALUES: [(&str, Option<&str>); 35] = [
         ("--tolerance", Some("0.2mm")),
         ("--period", Some("20ms")),
         ("--order", Some("optimize")),
@@ -226,6 +227,7 @@ mod tests {
         ("--crop", Some("sheet")),
         ("--split", Some("pens")),
         ("--machine", Some("corexy")),
+        ("--white-pens", Some("skip")),
     ];
 
     /// `-` where the option is no option of the command, `yes` where it has an effect, else the reason.

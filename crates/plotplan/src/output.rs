@@ -5,6 +5,11 @@ use std::path::Path;
 
 use crate::failure::Failure;
 
+/// Writes the text of a command whose result is its report, unless that is wanted as JSON.
+pub(crate) fn report(text: &str) -> Result<(), Failure> {
+    if crate::session::is_json() { Ok(()) } else { write("-", |out| out.write_all(text.as_bytes())) }
+}
+
 /// Writes to standard output for `-`, otherwise to a temporary file beside `to` that is renamed
 /// once it is complete. Refuses to replace an input.
 pub(crate) fn write(

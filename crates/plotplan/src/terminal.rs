@@ -1,20 +1,26 @@
 //! Standard error: diagnostics with an excerpt of the file, progress, reports.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use compiler::import::{Diagnostic, Severity};
 use compiler::pipeline::Step;
+use compiler::report::{Code, ErrorReport, Finding, Place};
 use drawing::Span;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::MessageFormat;
 use crate::input::Input;
+use crate::session;
 
 /// Bytes shown on either side of a place: files of a single line of 10 MB are common.
 const WINDOW: usize = 48;
+
+/// Diagnostics of one kind that are shown, unless all are asked for.
+const SHOWN_OF_A_KIND: usize = 5;
 
 thread_local! {
     /// What this thread prints, while it is captured.
@@ -31,7 +37,7 @@ pub(crate) fn captured<T>(work: impl FnOnce() -> T) -> (T, String) {
 
 /// Prints text to standard error, in colour where the terminal supports it. Ignores a closed
 /// standard error.
-pub(crate) fn say(text: &str) {
+pub(crate) fn always(text: &str) {
     let is_captured = CAPTURED
         .with_borrow_mut(|captured| captured.as_mut().map(|captured| captured.push_str(text)).is_some());
     if is_captured {
@@ -42,14 +48,70 @@ pub(crate) fn say(text: &str) {
     let _ = out.flush();
 }
 
-/// Prints an error.
-pub(crate) fn error(message: &str) {
-    render(&[Group::with_title(Level::ERROR.primary_title(message))]);
+/// The same for information, which `--quiet` leaves out.
+pub(crate) fn say(text: &str) {
+    if !session::style().quiet {
+        always(text);
+    }
 }
 
-/// Prints a warning.
-pub(crate) fn warning(message: &str) {
-    render(&[Group::with_title(Level::WARNING.primary_title(message))]);
+/// Prints the report of a command that writes its result elsewhere, unless it is wanted as JSON.
+pub(crate) fn report(text: &str) {
+    if !session::is_json() {
+        say(text);
+    }
+}
+
+/// Prints an error and records it as the cause of the failure.
+pub(crate) fn error(code: Code, message: &str) {
+    error_at(code, message, None);
+}
+
+/// Prints an error about one of several outputs and records it: the command goes on with the others.
+pub(crate) fn error_of_one(code: Code, message: &str) {
+    print_error(code, message);
+    session::found(Finding { severity: "error".to_owned(), ..Finding::warning(code, message) });
+}
+
+/// Prints an error with its place and records it as the cause of the failure.
+pub(crate) fn error_at(code: Code, message: &str, place: Option<Place>) {
+    print_error(code, message);
+    session::failed(ErrorReport { code, message: message.to_owned(), help: None, place });
+}
+
+fn print_error(code: Code, message: &str) {
+    if session::style().message_format == MessageFormat::Json {
+        let finding = Finding { severity: "error".to_owned(), ..Finding::warning(code, message) };
+        always(&line_of(&finding));
+    } else {
+        render(&[Group::with_title(Level::ERROR.primary_title(message))]);
+    }
+}
+
+/// Prints a warning and records it.
+pub(crate) fn warning(code: Code, message: &str) {
+    found(Level::WARNING, Finding::warning(code, message));
+}
+
+/// Prints a note and records it.
+pub(crate) fn note(code: Code, message: &str) {
+    found(Level::NOTE, Finding { severity: "note".to_owned(), ..Finding::warning(code, message) });
+}
+
+fn found(level: Level<'_>, finding: Finding) {
+    let style = session::style();
+    if !style.quiet {
+        match style.message_format {
+            MessageFormat::Json => always(&line_of(&finding)),
+            _ => render(&[Group::with_title(level.primary_title(finding.message.clone()))]),
+        }
+    }
+    session::found(finding);
+}
+
+/// A finding as a line of JSON.
+fn line_of(finding: &Finding) -> String {
+    format!("{}\n", serde_json::to_string(finding).unwrap_or_default())
 }
 
 fn render(report: &[Group<'_>]) {
@@ -57,55 +119,64 @@ fn render(report: &[Group<'_>]) {
     // The renderer marks an excerpt with an origin as a second, unnamed file: that line is removed.
     let is_mark = |line: &&str| anstream::adapter::strip_str(line).to_string().trim() == ":::";
     let lines: Vec<&str> = text.lines().filter(|line| !is_mark(line)).collect();
-    say(&format!("{}\n", lines.join("\n")));
+    always(&format!("{}\n", lines.join("\n")));
 }
 
-/// Prints diagnostics, each with its place in the file.
-pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic], format: MessageFormat) {
-    // Places in compressed or recoded files are not bytes of the file.
-    let is_plain = std::str::from_utf8(&input.bytes).is_ok();
+/// Prints diagnostics, each with its place in the file, and records them. Of each kind the first few,
+/// then their number.
+pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic]) {
+    let style = session::style();
+    let mut shown: BTreeMap<&str, usize> = BTreeMap::new();
     for diagnostic in diagnostics {
-        match format {
-            MessageFormat::Human => {}
-            MessageFormat::Short => {
-                say(&format!("{}\n", short(input, diagnostic)));
-                continue;
-            }
-            MessageFormat::Json => {
-                say(&format!("{}\n", object(input, diagnostic)));
-                continue;
-            }
-        }
-        let level = match diagnostic.severity {
-            Severity::Note => Level::NOTE,
-            Severity::Warning => Level::WARNING,
-            Severity::Error => Level::ERROR,
-        };
-        let mut title = diagnostic.message.clone();
-        if diagnostic.count > 1 {
-            title = format!("{title} (and {} more like it)", diagnostic.count - 1);
-        }
-        if let Some([line, column]) = diagnostic.line_column.filter(|_| !is_plain) {
-            let mut group = Group::with_title(level.primary_title(title).id(diagnostic.code))
-                .element(Origin::path(&input.name).line(line).char_column(column))
-                .element(Level::NOTE.message(&diagnostic.place));
-            if let Some(help) = &diagnostic.help {
-                group = group.element(Level::HELP.message(help));
-            }
-            render(&[group]);
+        session::found(Finding::of(&input.path, diagnostic));
+        if style.quiet && diagnostic.severity < Severity::Error {
             continue;
         }
-        let place = format!("byte {}, {}", diagnostic.span.start, diagnostic.place);
-        at_place(
-            input,
-            diagnostic.span,
-            level,
-            Some(diagnostic.code),
-            &title,
-            &place,
-            diagnostic.help.as_deref(),
-        );
+        let of_its_kind = shown.entry(diagnostic.code).or_default();
+        *of_its_kind += 1;
+        match style.message_format {
+            MessageFormat::Json => always(&line_of(&Finding::of(&input.path, diagnostic))),
+            _ if *of_its_kind > SHOWN_OF_A_KIND && !style.all => {}
+            MessageFormat::Short => always(&format!("{}\n", short(input, diagnostic))),
+            MessageFormat::Human => long(input, diagnostic),
+        }
     }
+    if style.all || style.message_format == MessageFormat::Json {
+        return;
+    }
+    for (code, count) in shown.into_iter().filter(|(_, count)| *count > SHOWN_OF_A_KIND) {
+        let more = count - SHOWN_OF_A_KIND;
+        let title = format!("{more} more diagnostics of the kind {code} are not shown (--all shows them)");
+        render(&[Group::with_title(Level::NOTE.primary_title(title))]);
+    }
+}
+
+/// Prints a diagnostic with a window of the file.
+fn long(input: &Input, diagnostic: &Diagnostic) {
+    let level = match diagnostic.severity {
+        Severity::Note => Level::NOTE,
+        Severity::Warning => Level::WARNING,
+        Severity::Error => Level::ERROR,
+    };
+    let mut title = diagnostic.message.clone();
+    if diagnostic.count > 1 {
+        title = format!("{title} (and {} more like it)", diagnostic.count - 1);
+    }
+    // Places in compressed or recoded files are not bytes of the file.
+    let is_plain = std::str::from_utf8(&input.bytes).is_ok();
+    if let Some([line, column]) = diagnostic.line_column.filter(|_| !is_plain) {
+        let mut group = Group::with_title(level.primary_title(title).id(diagnostic.code))
+            .element(Origin::path(&input.path).line(line).char_column(column))
+            .element(Level::NOTE.message(&diagnostic.place));
+        if let Some(help) = &diagnostic.help {
+            group = group.element(Level::HELP.message(help));
+        }
+        render(&[group]);
+        return;
+    }
+    let place = format!("byte {}, {}", diagnostic.span.start, diagnostic.place);
+    let help = diagnostic.help.as_deref();
+    excerpt(input, diagnostic.span, level, Some(diagnostic.code), &title, &place, help);
 }
 
 /// A diagnostic on one line, for grep.
@@ -116,32 +187,38 @@ fn short(input: &Input, diagnostic: &Diagnostic) -> String {
         Some([line, column]) => format!("{line}:{column}"),
         None => span.start.to_string(),
     };
-    format!("{}:{place}: {severity}[{code}]: {message}{times}", input.name)
+    format!("{}:{place}: {severity}[{code}]: {message}{times}", input.path)
 }
 
-/// A diagnostic as JSON.
-fn object(input: &Input, diagnostic: &Diagnostic) -> serde_json::Value {
-    let mut object = serde_json::json!({
-        "file": input.name,
-        "code": diagnostic.code,
-        "severity": diagnostic.severity.to_string(),
-        "message": diagnostic.message,
-        "help": diagnostic.help,
-        "count": diagnostic.count,
-        "byte": diagnostic.span.start,
-        "end": diagnostic.span.end,
-        "command": diagnostic.command,
-        "pen_mm": diagnostic.pen_mm,
-    });
-    if let Some([line, column]) = diagnostic.line_column {
-        object["line"] = line.into();
-        object["column"] = column.into();
+/// Prints an error about a stroke, with the excerpt of the file that draws it, and records it.
+pub(crate) fn error_in_file(
+    input: &Input,
+    span: Span,
+    code: Code,
+    title: &str,
+    note: &str,
+    help: &str,
+    place: Place,
+) {
+    if session::style().message_format == MessageFormat::Json {
+        let finding = Finding {
+            file: Some(input.path.clone()),
+            severity: "error".to_owned(),
+            help: Some(help.to_owned()),
+            byte: Some(span.start),
+            end: Some(span.end),
+            ..Finding::warning(code, title)
+        };
+        always(&line_of(&finding));
+    } else {
+        excerpt(input, span, Level::ERROR, None, title, note, Some(help));
     }
-    object
+    let help = Some(help.to_owned());
+    session::failed(ErrorReport { code, message: title.to_owned(), help, place: Some(place) });
 }
 
 /// Prints a message with the excerpt of the file that it is about.
-pub(crate) fn at_place(
+fn excerpt(
     input: &Input,
     span: Span,
     level: Level<'_>,
@@ -157,7 +234,7 @@ pub(crate) fn at_place(
         None => title,
     };
     let mut group = Group::with_title(title)
-        .element(Origin::path(&input.name).line(window.line).char_column(window.column))
+        .element(Origin::path(&input.path).line(window.line).char_column(window.column))
         .element(
             Snippet::source(window.text)
                 .line_start(window.line)
@@ -219,36 +296,45 @@ impl Window {
     }
 }
 
-/// Progress of planning; on a terminal only, and not during the first half second.
+/// Progress of planning: step, percentage, time left. On a terminal only.
 pub(crate) struct Progress {
     bar: ProgressBar,
+    step: RefCell<&'static str>,
 }
 
 impl Progress {
     pub(crate) fn new() -> Self {
         let is_captured = CAPTURED.with_borrow(Option::is_some);
-        let bar = if std::io::stderr().is_terminal() && !is_captured {
-            let bar = ProgressBar::new_spinner();
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
-                bar.set_style(style);
-            }
+        let bar = if std::io::stderr().is_terminal() && !is_captured && !session::style().quiet {
+            let bar = ProgressBar::new(1);
             bar.enable_steady_tick(Duration::from_millis(500));
             bar
         } else {
             ProgressBar::hidden()
         };
-        Self { bar }
+        Self { bar, step: RefCell::new("") }
     }
 
     pub(crate) fn step(&self, step: Step) {
-        self.bar.set_message(match step {
-            Step::Placing => "placing the drawing".to_owned(),
-            Step::Ordering => "ordering strokes".to_owned(),
-            Step::Planning => "planning motion".to_owned(),
-            Step::Verifying(done, all) => {
-                format!("verifying {} %", (100 * done).checked_div(all).unwrap_or(100))
+        let (name, done, all) = match step {
+            Step::Placing => ("placing the drawing", 0, 0),
+            Step::Ordering => ("ordering strokes", 0, 0),
+            Step::Planning(done, all) => ("planning motion", done as u64, all as u64),
+            Step::Verifying(done, all) => ("verifying", done, all),
+        };
+        if self.step.replace(name) != name {
+            // Steps without a count of their own show the time that they take.
+            let template =
+                if all > 0 { "{spinner} {msg} {percent} %, {eta} left" } else { "{spinner} {msg} {elapsed}" };
+            if let Ok(style) = ProgressStyle::with_template(template) {
+                self.bar.set_style(style);
             }
-        });
+            self.bar.set_message(name);
+            self.bar.reset_elapsed();
+            self.bar.reset_eta();
+        }
+        self.bar.set_length(all.max(1));
+        self.bar.set_position(done);
     }
 
     pub(crate) fn finish(&self) {
@@ -263,7 +349,7 @@ pub(crate) struct SendingProgress {
 
 impl SendingProgress {
     pub(crate) fn new(of_us: u64) -> Self {
-        let bar = if std::io::stderr().is_terminal() {
+        let bar = if std::io::stderr().is_terminal() && !session::style().quiet {
             let bar = ProgressBar::new(of_us / 1000);
             if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent}% {msg}") {
                 bar.set_style(style);

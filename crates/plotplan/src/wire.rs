@@ -255,11 +255,11 @@ impl Operator {
             match &waiting {
                 Some(Waiting::Machine(comment)) => {
                     let what = if comment.is_empty() { "the operator" } else { comment };
-                    terminal::say(&format!(
+                    terminal::always(&format!(
                         "the machine waits for a pen change: {what}, then press Enter (or the machine's cycle start)\n"
                     ));
                 }
-                Some(Waiting::Operator) => terminal::say("paused with the pen up; p resumes\n"),
+                Some(Waiting::Operator) => terminal::always("paused with the pen up; p resumes\n"),
                 None => {}
             }
             self.waiting = waiting;
@@ -284,10 +284,10 @@ impl Operator {
         self.pausing = !self.pausing && session.waiting_for() != Some(Waiting::Operator);
         if self.pausing {
             session.pause();
-            terminal::say("pausing at the next pen-up; p resumes\n");
+            terminal::always("pausing at the next pen-up; p resumes\n");
         } else {
             session.resume(now_us);
-            terminal::say("resumed\n");
+            terminal::always("resumed\n");
         }
     }
 }

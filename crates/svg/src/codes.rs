@@ -45,7 +45,7 @@ codes! {
     BAD_VALUE = 110 "S0110" Warning "value not understood"
         "An attribute or property has a value that is not allowed or not supported. The element is drawn as if it were \
          not given."
-    BAD_PATH = 111 "S0111" Error "error in path data"
+    BAD_PATH = 111 "S0111" Warning "error in path data"
         "The data of a path, polyline or polygon have an error. What stands before the error is drawn, as the \
          standard asks for."
     UNKNOWN_ELEMENT = 112 "S0112" Warning "unknown element"
@@ -55,7 +55,7 @@ codes! {
          `:first-child`, or selectors that are malformed. The rule has no effect."
     BAD_REFERENCE = 114 "S0114" Warning "reference to nothing"
         "A reference names an element that is not in the file, or lies in another file. Other files are not read."
-    RECURSION = 115 "S0115" Error "element refers to itself"
+    RECURSION = 115 "S0115" Warning "element refers to itself"
         "An element contains a reference to itself, by itself or through others. The reference is not followed."
     SIZE_ASSUMED = 120 "S0120" Note "size assumed"
         "The `svg` element lacks width or height (or gives them in percent). The size of the viewBox is taken, in \
@@ -69,7 +69,7 @@ codes! {
          option, or give the shape a stroke."
     FILL_OF_STROKE = 202 "S0202" Note "only the stroke is drawn"
         "A shape has a stroke and a fill. The stroke is drawn, the fill is not. Hatch fills with the hatch option."
-    IMAGE = 203 "S0203" Error "image not drawn"
+    IMAGE = 203 "S0203" Warning "image not drawn"
         "A picture made of pixels, or a linked file. A pen cannot draw it; trace it to paths in an editor."
     MASK = 204 "S0204" Warning "mask not applied"
         "Masks change opacity, which a pen does not have. The masked element is drawn whole. Use a clip path where the \
@@ -79,16 +79,16 @@ codes! {
     PAINT_SERVER = 206 "S0206" Warning "gradient or pattern as a plain colour"
         "A gradient or a pattern paints a stroke or a hatched fill. A pen has one colour: the first of the gradient, or \
          the fallback."
-    FOREIGN_OBJECT = 207 "S0207" Error "foreignObject not drawn"
+    FOREIGN_OBJECT = 207 "S0207" Warning "foreignObject not drawn"
         "The element holds HTML or another language inside SVG. It is not drawn. Export the drawing with text as SVG \
          text or as paths."
     TEXT_FONT = 208 "S0208" Warning "text in the stroke font"
         "Text is drawn with the built-in single-stroke font at its place, size and anchor; its letters have other \
          shapes and widths than those of the font that the file names. For these, convert the text to paths in an \
          editor."
-    UNKNOWN_CHARACTER = 209 "S0209" Error "character not drawn"
+    UNKNOWN_CHARACTER = 209 "S0209" Warning "character not drawn"
         "The built-in stroke font lacks a character. Its place stays empty. Convert the text to paths in an editor."
-    TEXT_NOT_DRAWN = 210 "S0210" Error "text not drawn"
+    TEXT_NOT_DRAWN = 210 "S0210" Warning "text not drawn"
         "Text flowed into a shape by a draft of SVG 1.2, or any text where no font is given, is not drawn. Convert it to \
          paths in an editor."
     HIDDEN = 211 "S0211" Note "hidden elements"
@@ -98,12 +98,12 @@ codes! {
     CLIP_NOT_APPLIED = 214 "S0214" Warning "clip path not applied"
         "A clip path made of text, or one in units of the bounding box of a group, is not supported. The element is \
          drawn whole."
-    TOO_MANY_DASHES = 215 "S0215" Error "dashes too fine"
+    TOO_MANY_DASHES = 215 "S0215" Warning "dashes too fine"
         "The dashes of a stroke are so short that the drawing would have millions of them. It is drawn solid."
-    HATCH_TOO_FINE = 216 "S0216" Error "hatch too fine"
+    HATCH_TOO_FINE = 216 "S0216" Warning "hatch too fine"
         "The hatch of an area would have millions of lines. It is not hatched. Usually the spacing or the size of the \
          drawing is not as intended."
-    OUT_OF_RANGE = 217 "S0217" Error "coordinate out of range"
+    OUT_OF_RANGE = 217 "S0217" Warning "coordinate out of range"
         "After all transforms a point is more than 25 km from the page's origin. The path is left out."
     ANIMATION = 219 "S0219" Note "script or animation skipped"
         "Scripts and animations are not run: the drawing is what the file holds at rest."

@@ -85,19 +85,30 @@ pub struct QuantizationError {
     pub rms_mm: f64,
 }
 
-/// The peaks of one motor, in finite differences of the table's whole ticks.
+/// The peaks of one motor.
 ///
-/// With steps of one period `T` the bounds are `|first difference| <= v T + 1 tick` and
-/// `|second difference| <= a T² + 2 ticks`, because each tick is off by half a tick at most. A
-/// share is the difference divided by its bound: a good plan reaches at most 1.
+/// With steps of one period `T` the bounds on whole ticks are `|first difference| <= v T + 1 tick` and
+/// `|second difference| <= a T² + 2 ticks`, because each tick is off by half a tick at most. Exact
+/// positions are bounded by the limits themselves. A share is a difference divided by its bound, that
+/// of the exact motion where all rows came with exact positions: a good plan reaches at most 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorPeak {
     /// Name of the motor.
     pub name: String,
-    /// Largest first difference over time, ticks/s; includes the rounding of its two ticks.
-    pub speed_ticks_s: f64,
-    /// Largest second difference over time², ticks/s²; includes the rounding of its three ticks.
-    pub acceleration_ticks_s2: f64,
+    /// Peak speed of the exact motion, ticks/s. `None` unless every row came with exact positions.
+    pub speed_ticks_s: Option<f64>,
+    /// Peak acceleration of the exact motion, ticks/s². `None` as above.
+    pub acceleration_ticks_s2: Option<f64>,
+    /// First difference of whole ticks over time that is closest to its bound, ticks/s; includes the
+    /// rounding of two ticks.
+    pub whole_tick_speed_ticks_s: f64,
+    /// Its bound: the limit plus the rounding allowance, ticks/s.
+    pub whole_tick_speed_allowed_ticks_s: f64,
+    /// Second difference of whole ticks over time² that is closest to its bound, ticks/s²; includes the
+    /// rounding of three ticks.
+    pub whole_tick_acceleration_ticks_s2: f64,
+    /// Its bound: the limit plus the rounding allowance, ticks/s².
+    pub whole_tick_acceleration_allowed_ticks_s2: f64,
     /// The speed limit of the machine, ticks/s.
     pub speed_limit_ticks_s: f64,
     /// The acceleration limit of the machine, ticks/s².
@@ -116,12 +127,17 @@ pub struct MotorPeak {
     pub jerk: Option<JerkPeak>,
 }
 
-/// The peak jerk of one motor. With steps of one period `T` the bound is
-/// `|third difference| <= j T³ + 4 ticks`.
+/// The peak jerk of one motor, as in [`MotorPeak`]. With steps of one period `T` the bound on whole
+/// ticks is `|third difference| <= j T³ + 4 ticks`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JerkPeak {
-    /// Largest third difference over time³, ticks/s³; includes the rounding of its four ticks.
-    pub jerk_ticks_s3: f64,
+    /// Peak jerk of the exact motion, ticks/s³. `None` unless every row came with exact positions.
+    pub jerk_ticks_s3: Option<f64>,
+    /// Third difference of whole ticks over time³ that is closest to its bound, ticks/s³; includes the
+    /// rounding of four ticks.
+    pub whole_tick_jerk_ticks_s3: f64,
+    /// Its bound: the limit plus the rounding allowance, ticks/s³.
+    pub whole_tick_jerk_allowed_ticks_s3: f64,
     /// The jerk limit of the machine, ticks/s³.
     pub limit_ticks_s3: f64,
     /// Largest share of the bound.

@@ -18,24 +18,44 @@ use crate::{JerkPeak, histogram::Histogram, limits::Excess};
 pub(crate) struct JerkCheck {
     limit: f64,
     period_s: f64,
+    /// Size of a rounding step: 1 tick, or 0 for exact positions.
+    rounding_ticks: f64,
     /// The last three rows: time relative to the last one, s, and position, ticks.
     rows: [(f64, f64); 3],
+    /// The third difference with the largest share of its bound.
     jerk: f64,
+    /// Its bound.
+    allowed: f64,
     share: f64,
     shares: Histogram,
 }
 
 impl JerkCheck {
+    /// For whole ticks.
     pub(crate) fn new(limit: f64, period_us: u64) -> Self {
         let period_s = period_us.max(1) as f64 * 1e-6;
         let rows = [(-2.0 * period_s, 0.0), (-period_s, 0.0), (0.0, 0.0)];
-        Self { limit, period_s, rows, jerk: 0.0, share: 0.0, shares: Histogram::new() }
+        Self {
+            limit,
+            period_s,
+            rounding_ticks: 1.0,
+            rows,
+            jerk: 0.0,
+            allowed: limit,
+            share: 0.0,
+            shares: Histogram::new(),
+        }
+    }
+
+    /// For exact positions.
+    pub(crate) fn exact(limit: f64, period_us: u64) -> Self {
+        Self { rounding_ticks: 0.0, ..Self::new(limit, period_us) }
     }
 
     /// The motor moves by `difference` ticks in `dt_us`. Returns the largest excess in this step.
-    pub(crate) fn step(&mut self, dt_us: u64, difference: i64) -> Option<Excess> {
+    pub(crate) fn step(&mut self, dt_us: u64, difference: f64) -> Option<Excess> {
         let dt_s = dt_us as f64 * 1e-6;
-        let (difference, from) = (difference as f64, self.rows[2].1);
+        let from = self.rows[2].1;
         let mut worst = None;
         // Of the omitted rows, only the first and last two can enter a third difference that is not
         // 0.
@@ -81,10 +101,12 @@ impl JerkCheck {
             divided += weight * q;
             allowance += weight.abs();
         }
-        let (value, allowed) = (6.0 * f64::abs(divided), self.limit + 3.0 * allowance);
+        let rounding = 3.0 * self.rounding_ticks * allowance;
+        let (value, allowed) = (6.0 * f64::abs(divided), self.limit + rounding);
         let share = value / allowed;
-        self.jerk = self.jerk.max(value);
-        self.share = self.share.max(share);
+        if share > self.share {
+            (self.jerk, self.allowed, self.share) = (value, allowed, share);
+        }
         self.shares.add(share, 1.0);
         // `NaN` as a limit is exceeded by every value. The tolerance covers rounding in the divided
         // difference.
@@ -95,12 +117,16 @@ impl JerkCheck {
         Some(Excess { value, allowed })
     }
 
-    pub(crate) fn peak(self) -> JerkPeak {
+    /// The peak of whole ticks; that of the motion from `exact`, where its positions are known.
+    pub(crate) fn peak(&self, exact: Option<&Self>) -> JerkPeak {
+        let motion = exact.unwrap_or(self);
         JerkPeak {
-            jerk_ticks_s3: self.jerk,
+            jerk_ticks_s3: exact.map(|exact| exact.jerk),
             limit_ticks_s3: self.limit,
-            share_p999: self.shares.percentile(0.999, self.share),
-            share: self.share,
+            whole_tick_jerk_ticks_s3: self.jerk,
+            whole_tick_jerk_allowed_ticks_s3: self.allowed,
+            share_p999: motion.shares.percentile(0.999, motion.share),
+            share: motion.share,
         }
     }
 
@@ -120,7 +146,7 @@ mod tests {
     fn first_excess(steps: &[(u64, i64)]) -> Option<usize> {
         let mut check = JerkCheck::new(1e7, PERIOD_US);
         for (index, (periods, step)) in steps.iter().enumerate() {
-            if check.step(periods * PERIOD_US, *step).is_some() {
+            if check.step(periods * PERIOD_US, *step as f64).is_some() {
                 return Some(index);
             }
         }
@@ -159,6 +185,6 @@ mod tests {
 
     #[test]
     fn nan_limit_is_exceeded() {
-        assert!(JerkCheck::new(f64::NAN, 0).step(1, 1).is_some());
+        assert!(JerkCheck::new(f64::NAN, 0).step(1, 1.0).is_some());
     }
 }

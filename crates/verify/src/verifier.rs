@@ -36,6 +36,38 @@ struct Previous {
     index: u64,
     ticks: Pose,
     exact: Option<Pose>,
+    /// Exact motor positions, where known.
+    exact_ticks: Option<[f64; MOTORS]>,
+}
+
+/// Limit checks of one motor's exact positions.
+#[derive(Clone, Debug)]
+struct ExactCheck {
+    motor: MotorCheck,
+    jerk: Option<JerkCheck>,
+}
+
+impl ExactCheck {
+    fn new(motor: &kinematics::Motor, period_us: u64) -> Self {
+        Self {
+            motor: MotorCheck::exact(motor.clone(), period_us),
+            jerk: motor.max_jerk_ticks_s3.map(|limit| JerkCheck::exact(limit, period_us)),
+        }
+    }
+
+    fn step(&mut self, dt_us: u64, difference: f64) {
+        self.motor.step(dt_us, difference);
+        if let Some(jerk) = &mut self.jerk {
+            jerk.step(dt_us, difference);
+        }
+    }
+
+    fn stop(&mut self) {
+        self.motor.stop();
+        if let Some(jerk) = &mut self.jerk {
+            jerk.stop();
+        }
+    }
 }
 
 /// A movement of the pen itself.
@@ -75,6 +107,8 @@ pub struct Verifier<'a> {
     motors: [MotorCheck; MOTORS],
     /// For motors with a jerk limit.
     jerk: [Option<JerkCheck>; MOTORS],
+    /// Of the exact positions, while all rows came with them.
+    exact: Option<[ExactCheck; MOTORS]>,
     failures: Failures,
     rows: u64,
     previous: Option<Previous>,
@@ -162,6 +196,7 @@ impl<'a> Verifier<'a> {
                 .motors()
                 .each_ref()
                 .map(|motor| motor.max_jerk_ticks_s3.map(|limit| JerkCheck::new(limit, timing.period_us))),
+            exact: Some(machine.motors().each_ref().map(|motor| ExactCheck::new(motor, timing.period_us))),
             failures,
             rows: 0,
             previous: None,
@@ -209,7 +244,10 @@ impl<'a> Verifier<'a> {
         }
         self.check_joints(&ticks, here);
         self.check_rounding(row, exact, here);
-        let current = Previous { row, index, ticks, exact: exact_pose };
+        let current = Previous { row, index, ticks, exact: exact_pose, exact_ticks: exact };
+        if exact.is_none() {
+            self.exact = None;
+        }
         match previous {
             None => self.first(&current, here),
             Some(previous) => {
@@ -283,7 +321,12 @@ impl<'a> Verifier<'a> {
         for motor in 0..MOTORS {
             let difference = row.ticks[motor].saturating_sub(before.ticks[motor]);
             moves |= difference != 0;
-            self.check_limits(motor, dt_us, difference, here);
+            self.check_limits(motor, dt_us, difference as f64, here);
+            if let (Some(exact), Some(from), Some(to)) =
+                (&mut self.exact, previous.exact_ticks, current.exact_ticks)
+            {
+                exact[motor].step(dt_us, to[motor] - from[motor]);
+            }
         }
         if moves && dt_us < self.timing.period_us {
             let violation = Violation::Period { dt_us, period_us: self.timing.period_us };
@@ -312,7 +355,7 @@ impl<'a> Verifier<'a> {
     }
 
     /// One motor's step against its limits.
-    fn check_limits(&mut self, motor: usize, dt_us: u64, difference: i64, here: Location) {
+    fn check_limits(&mut self, motor: usize, dt_us: u64, difference: f64, here: Location) {
         let (fast, sudden) = self.motors[motor].step(dt_us, difference);
         if let Some(excess) = fast {
             let violation = Violation::Speed {
@@ -433,9 +476,14 @@ impl<'a> Verifier<'a> {
         let ink = before_rounding.as_ref().map_or(&self.after, |(_, trace)| trace);
         let (ink_mm, dots) = (ink.length, ink.dots);
         let failures = self.failures.into_vec();
-        let jerk = self.jerk;
-        let mut peaks = jerk.map(|jerk| jerk.map(JerkCheck::peak)).into_iter();
-        let motors = self.motors.map(|motor| motor.peak(peaks.next().flatten()));
+        let (jerk, exact) = (self.jerk, self.exact);
+        let mut index = 0..MOTORS;
+        let motors = self.motors.map(|motor| {
+            let index = index.next().unwrap_or_default();
+            let exact = exact.as_ref().map(|exact| &exact[index]);
+            let peak = |jerk: &JerkCheck| jerk.peak(exact.and_then(|exact| exact.jerk.as_ref()));
+            motor.peak(exact.map(|exact| &exact.motor), jerk[index].as_ref().map(peak))
+        });
         Certificate {
             holds: failures.is_empty(),
             failures,
@@ -469,6 +517,9 @@ impl<'a> Verifier<'a> {
             }
             let excess = self.jerk[motor].as_mut().and_then(JerkCheck::stop);
             self.note_jerk(motor, excess, here);
+            if let Some(exact) = &mut self.exact {
+                exact[motor].stop();
+            }
         }
         let Row { pen, ticks: found, .. } = last.row;
         if pen != 0 {

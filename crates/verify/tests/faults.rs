@@ -195,7 +195,7 @@ fn verify_rows(machine: &Machine, plotter: &Plotter) -> Certificate {
 fn speed_5_percent_above_the_limit() {
     let machine = cartesian();
     let plotter = good(&machine);
-    let fastest = verify_rows(&machine, &plotter).motors[0].speed_ticks_s;
+    let fastest = verify_rows(&machine, &plotter).motors[0].whole_tick_speed_ticks_s;
     let limited = |limit| with_motor_x(&machine, |x| x.max_speed_ticks_s = limit);
     let certificate = verify_rows(&limited((fastest - 1.0 / 0.01) / 1.05), &plotter);
     let (violation, sentence) = only(&certificate);
@@ -216,7 +216,7 @@ fn jerk_5_percent_above_the_limit() {
     let peak = certificate.motors[0].jerk.expect("x has a jerk limit");
     assert!(peak.share < 1e-3 && peak.share_p999 <= peak.share, "{peak:?}");
     // The allowance is four ticks a period cubed.
-    let hardest = peak.jerk_ticks_s3 - 4e6;
+    let hardest = peak.whole_tick_jerk_ticks_s3 - 4e6;
     let certificate = verify_rows(&limited(hardest / 1.05), &plotter);
     let (violation, sentence) = only(&certificate);
     assert!(matches!(violation, Violation::Jerk { motor, .. } if motor == "x"), "{sentence}");
@@ -240,7 +240,7 @@ fn jerk_of_the_last_stop() {
         certificate.failures.iter().find(|failure| matches!(failure.violation, Violation::Jerk { .. }));
     let jerk = jerk.unwrap_or_else(|| panic!("{:#?}", sentences(&certificate)));
     assert_eq!(
-        (jerk.count, certificate.motors[0].jerk.map(|peak| peak.jerk_ticks_s3.round())),
+        (jerk.count, certificate.motors[0].jerk.map(|peak| peak.whole_tick_jerk_ticks_s3.round())),
         (2, Some(3e7))
     );
 }

@@ -44,8 +44,8 @@ impl Ebb {
             encode::Pen::Toggle
         } else {
             // The output of the board's own pen servo, and positions well inside what servos take.
-            let (up, down) = options.pen_positions.unwrap_or((16_000, 12_000));
-            encode::Pen::Servo { up: up.max(0) as u16, down: down.max(0) as u16, pin: 4 }
+            let (up, down) = options.pen_positions.unwrap_or((16_000.0, 12_000.0));
+            encode::Pen::Servo { up: up.max(0.0) as u16, down: down.max(0.0) as u16, pin: 4 }
         };
         EbbEncoder { moves, pen }
     }

@@ -30,7 +30,7 @@ pub(crate) enum Flavour {
 }
 
 /// What moves the pen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pen {
     /// A servo: spindle speed for grbl and FluidNC, degrees for the others.
     Servo {
@@ -42,9 +42,9 @@ pub(super) enum Pen {
     /// The Z axis, mm.
     Z {
         /// Height with the pen up.
-        up: i16,
+        up: f64,
         /// Height with the pen down.
-        down: i16,
+        down: f64,
     },
 }
 

@@ -41,11 +41,11 @@ fn options(
 ) -> Result<encode::Options, crate::Unrepresentable> {
     let lift = plan.machine(format)?.pen();
     let pen = if options.pen_actuator == Some(PenActuator::Z) {
-        let (up, down) = options.pen_positions.unwrap_or((5, 0));
+        let (up, down) = options.pen_positions.unwrap_or((5.0, 0.0));
         encode::Pen::Z { up, down }
     } else {
-        let (up, down) = options.pen_positions.unwrap_or((40, 90));
-        encode::Pen::Servo { up: up.max(0) as u16, down: down.max(0) as u16 }
+        let (up, down) = options.pen_positions.unwrap_or((40.0, 90.0));
+        encode::Pen::Servo { up: up.max(0.0) as u16, down: down.max(0.0) as u16 }
     };
     Ok(encode::Options {
         flavour,

@@ -123,7 +123,7 @@ pub struct Setup {
 /// The pen settings of the command line: default, actuator, positions, both.
 fn pen_settings() -> Vec<EncodeOptions> {
     let actuators = [None, Some(PenActuator::Servo), Some(PenActuator::Z)];
-    let positions = [None, Some((30, 80))];
+    let positions = [None, Some((30.0, 80.0))];
     let all = actuators.into_iter().flat_map(|pen_actuator| {
         positions.map(|pen_positions| EncodeOptions { pen_actuator, pen_positions, legacy_moves: false })
     });

@@ -1,5 +1,6 @@
 //! HP-GL and HP-GL/2, bare or wrapped in PCL or PJL.
 
+use drawing::Pen;
 use hpgl::{Generation, Profile, ProfileReason, Wrappers};
 
 use super::{Diagnostic, Document, Fact, ImportError, Importer, Options, Page, PenSettings, Severity};
@@ -16,14 +17,24 @@ pub(super) fn explain(code: &str) -> Option<(String, &'static str)> {
 fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     let document = hpgl::read(bytes, &reader_options(options)?);
     let facts = facts(bytes, &document.summary);
-    let pages = document.pages.into_iter().map(|page| Page {
-        drawing: page.drawing,
-        pens: page.pens.into_iter().map(|(pen, settings)| (pen, pen_settings(settings))).collect(),
+    let white = &document.summary.white_pens;
+    let is_skipped = |pen: &Pen| options.skip_white_pens && white.contains(pen);
+    let pages = document.pages.into_iter().map(|mut page| {
+        page.drawing.strokes.retain(|stroke| !is_skipped(&stroke.pen));
+        page.pens.retain(|pen, _| !is_skipped(pen));
+        Page {
+            drawing: page.drawing,
+            pens: page.pens.into_iter().map(|(pen, settings)| (pen, pen_settings(settings))).collect(),
+        }
     });
     Ok(Document {
         format: IMPORTER.name,
         pages: pages.collect(),
-        diagnostics: document.diagnostics.into_iter().map(diagnostic).collect(),
+        diagnostics: document
+            .diagnostics
+            .into_iter()
+            .map(|found| white_pen(diagnostic(found), white, options.skip_white_pens))
+            .collect(),
         size: format!("{} commands", document.summary.commands),
         facts,
     })
@@ -73,6 +84,22 @@ fn diagnostic(found: hpgl::Diagnostic) -> Diagnostic {
         command: Some(found.command),
         pen_mm: Some([x, y]),
     }
+}
+
+/// The code of white pens.
+const WHITE_PEN: &str = "H0229";
+
+/// Says of the finding about white pens what was done with their ink.
+fn white_pen(found: Diagnostic, white: &[Pen], is_skipped: bool) -> Diagnostic {
+    if found.code != WHITE_PEN {
+        return found;
+    }
+    if !is_skipped {
+        return Diagnostic { help: Some("--white-pens skip leaves it out".to_owned()), ..found };
+    }
+    let pens: Vec<String> = white.iter().map(|pen| pen.0.to_string()).collect();
+    let message = format!("ink of white pens is left out (PC; --white-pens skip): pen {}", pens.join(", "));
+    Diagnostic { severity: Severity::Note, message, ..found }
 }
 
 /// Dialect, producer, plotter and commands.

@@ -24,6 +24,9 @@ pub struct Options {
     pub plotter: Option<String>,
     /// The paper loaded in that plotter; the plotter's first one if `None`.
     pub paper: Option<String>,
+    /// HP-GL: whether the ink of pens that `PC` makes white is left out.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub skip_white_pens: bool,
     /// How an SVG file is read.
     #[serde(skip_serializing_if = "is_default")]
     pub svg: SvgOptions,
@@ -104,6 +107,9 @@ pub fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     if importer.name != svg::IMPORTER.name && !is_default(&options.svg) {
         let options = "--pens, --hatch, --outline-fills and --dpi are";
         return Err(ImportError::NoEffect { options, format: importer.name });
+    }
+    if importer.name != hpgl::IMPORTER.name && options.skip_white_pens {
+        return Err(ImportError::NoEffect { options: "--white-pens is", format: importer.name });
     }
     (importer.read)(bytes, options)
 }

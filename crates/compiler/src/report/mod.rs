@@ -1,281 +1,328 @@
 //! Reports: the result of a command, as types that serialize, and as [`text`].
 //!
-//! Lengths are mm, times s, speeds ticks/s; a share is a fraction of its limit.
+//! Every command reports with the same type, [`Report`], on success and on failure. `docs/reports.md`
+//! and the JSON schema are generated from the types of this module; see [`page`].
 
+mod certificate;
+mod input;
+mod machine;
+pub mod page;
+mod round;
+mod sending;
+mod summary;
 pub mod text;
 
-use std::collections::BTreeMap;
-
+use schemars::JsonSchema;
 use serde::Serialize;
-use verify::{Certificate, Deviation, DeviationStats, MotorPeak};
 
-use crate::pipeline::Compiled;
+pub use self::certificate::{
+    CertificateReport, DeviationReport, Distances, JerkReport, MotorReport, TickFloor,
+};
+pub use self::input::{DrawingReport, FactReport, MotorLimits, PageReport, PenReport, PlanReport};
+pub use self::machine::{ListedMachine, MachineMotor, MachineReport, MachineSource, SheetReport};
+pub use self::sending::{SendEnd, SendReport};
+pub use self::summary::{Ordering, Summary};
 
-/// The summary of a plan.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
-    /// Strokes of the drawing.
+use crate::import::Diagnostic;
+use crate::pipeline::Arranged;
+
+/// Version of the form of reports. A key that is removed or changes its meaning or unit raises it; a
+/// new key does not.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The result of a command.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Report {
+    /// Version of this form. It rises when a key is removed or changes its meaning or unit.
+    pub schema_version: u32,
+    /// The program and its version.
+    pub program: String,
+    /// The command, such as `convert` or `machine check`.
+    pub command: String,
+    /// The input files, as given; `-` is standard input.
+    pub inputs: Vec<String>,
+    /// The exit code of the program.
+    pub exit_code: u8,
+    /// Why the command failed; `null` if it did not.
+    pub error: Option<ErrorReport>,
+    /// Findings about the inputs and warnings, in the order in which they were found.
+    pub diagnostics: Vec<Finding>,
+    /// The drawing, from `check` and `info`.
+    pub drawing: Option<DrawingReport>,
+    /// A plan that was read, from `info`.
+    pub plan: Option<PlanReport>,
+    /// The files that were written, from `convert`, in the order of their names.
+    pub outputs: Vec<OutputReport>,
+    /// The plan that was computed, from `convert` with one output, and from `info` with a machine.
+    pub summary: Option<Summary>,
+    /// What the replay of a plan measured, from `convert` with one output, from `verify`, and from `info` with a machine.
+    pub certificate: Option<CertificateReport>,
+    /// Differences between a plan's header and the machine or drawing that it was verified with, in
+    /// sentences; from `verify`.
+    pub mismatches: Option<Vec<String>>,
+    /// The machine, from `machine check`, and its verdict on a drawing from `check` with a machine.
+    pub machine: Option<MachineReport>,
+    /// The machines that can be named, from `machine list`.
+    pub machines: Option<Vec<ListedMachine>>,
+    /// What was sent, from `send`.
+    pub sending: Option<SendReport>,
+}
+
+/// A file that was written.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct OutputReport {
+    /// The file, as given; `-` is standard output.
+    pub file: String,
+    /// The drawing, with `--format hpgl` and `svg`.
+    pub drawing: Option<ArrangedReport>,
+    /// The plan, with other formats.
+    pub summary: Option<Summary>,
+    /// The plan's certificate.
+    pub certificate: Option<CertificateReport>,
+}
+
+/// A drawing as it was written.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ArrangedReport {
+    /// Number of strokes.
     pub strokes: usize,
-    /// Strokes drawn, after ordering joined those that touch.
-    pub strokes_drawn: usize,
-    /// Pen downs without motion.
-    pub dots: u64,
-    /// The pens that draw, in the order of their first use.
-    pub pens: Vec<u16>,
-    /// Length drawn, mm.
+    /// Length of the ink, mm.
     pub ink_mm: f64,
-    /// Length travelled with the pen up, mm.
-    pub travel_mm: f64,
+    /// The pens that draw, in the order of their numbers.
+    pub pens: Vec<u16>,
     /// How far ink reaches beyond the sheet, mm; 0 if it does not.
     pub beyond_sheet_mm: f64,
-    /// Rows of the plan.
-    pub rows: u64,
-    /// Duration of the plan, s.
-    pub duration_s: f64,
-    /// Time with the pen down and moving, s.
-    pub drawing_s: f64,
-    /// Time of travel, s.
-    pub travel_s: f64,
-    /// Time of pen lifts and drops, s.
-    pub lifting_s: f64,
-    /// Drawing time by what limited the speed, s.
-    pub limited_by_s: BTreeMap<String, f64>,
-    /// Share of the duration with the pen up.
-    pub pen_up_share: f64,
-    /// Coefficients `a b c d e f` of the map from drawing mm to machine mm.
-    pub placement: [f64; 6],
-    /// Pen changes in the order drawn.
-    pub pen_changes: usize,
     /// What ordering gained; `null` for the file's order.
     pub ordering: Option<Ordering>,
 }
 
-/// What ordering gained.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ordering {
-    /// Strokes before joining and removing duplicates.
-    pub strokes_before: usize,
-    /// Strokes after it.
-    pub strokes_after: usize,
-    /// Strokes joined to another one.
-    pub merged: usize,
-    /// Duplicate strokes removed.
-    pub duplicates_removed: usize,
-    /// Travel in the file's order, mm.
-    pub travel_mm_before: f64,
-    /// Travel in the order drawn, mm.
-    pub travel_mm_after: f64,
-    /// Travel with lifts and drops in the file's order, s.
-    pub travel_s_before: f64,
-    /// Travel with lifts and drops in the order drawn, s.
-    pub travel_s_after: f64,
-}
-
-impl Summary {
-    /// The summary of a compiled plan.
-    pub fn of(compiled: &Compiled<'_>) -> Self {
-        let times = compiled.trajectory.times();
-        let certificate = &compiled.certificate;
-        let duration_s = compiled.header.duration_us as f64 * 1e-6;
+impl ArrangedReport {
+    /// The report of a drawing.
+    pub fn of(arranged: &Arranged) -> Self {
+        let drawing = &arranged.drawing;
         Self {
-            strokes: compiled.placed.strokes.len(),
-            strokes_drawn: compiled.strokes,
-            dots: certificate.dots,
-            pens: certificate.pens.clone(),
-            ink_mm: certificate.ink_mm,
-            travel_mm: certificate.travel_mm,
-            beyond_sheet_mm: compiled.beyond_sheet_mm,
-            rows: compiled.header.rows,
-            duration_s,
-            drawing_s: times.drawing_s,
-            travel_s: times.travel_s,
-            lifting_s: times.lifting_s,
-            limited_by_s: text::limited_by(compiled).into_iter().collect(),
-            pen_up_share: (times.travel_s + times.lifting_s) / duration_s,
-            placement: compiled.placement.as_coeffs(),
-            pen_changes: text::pen_changes(compiled.ordered()),
-            ordering: compiled.ordering.as_ref().map(|report| Ordering {
-                strokes_before: report.strokes_before,
-                strokes_after: report.strokes_after,
-                merged: report.merged,
-                duplicates_removed: report.duplicates_removed,
-                travel_mm_before: report.travel_mm_before,
-                travel_mm_after: report.travel_mm_after,
-                travel_s_before: report.travel_cost_before,
-                travel_s_after: report.travel_cost_after,
-            }),
+            strokes: drawing.strokes.len(),
+            ink_mm: round::mm(drawing.length()),
+            pens: drawing.pens().iter().map(|pen| pen.0).collect(),
+            beyond_sheet_mm: round::mm(arranged.beyond_sheet_mm),
+            ordering: arranged.ordering.as_ref().map(Ordering::of),
         }
     }
 }
 
-/// A certificate: what the replay of a plan measured.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CertificateReport {
-    /// Whether nothing failed.
-    pub holds: bool,
-    /// What failed, in sentences.
-    pub failures: Vec<String>,
-    /// The tolerance claimed, mm.
-    pub tolerance_mm: f64,
-    /// Distances of the exact path; `null` where exact positions are not known.
-    pub before_rounding: Option<DeviationReport>,
-    /// Distances of the path through whole ticks; `null` where no drawing was given.
-    pub after_rounding: Option<DeviationReport>,
-    /// The quantization error of this machine along this ink.
-    pub tick_floor: TickFloor,
-    /// Largest distance of a row from its exact position, ticks.
-    pub largest_rounding_ticks: Option<f64>,
-    /// The pens that draw, in the order of their first use.
-    pub pens: Vec<u16>,
-    /// Peaks of each motor.
-    pub motors: Vec<MotorReport>,
-    /// Rows of the plan.
-    pub rows: u64,
-    /// Duration of the plan, s.
-    pub duration_s: f64,
-    /// Length drawn, mm.
-    pub ink_mm: f64,
-    /// Length travelled with the pen up, mm.
-    pub travel_mm: f64,
-    /// Times that the pen goes down.
-    pub pen_downs: u64,
-    /// Pen downs without motion.
-    pub dots: u64,
+/// A finding about an input, or a warning of the program.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Finding {
+    /// The input file, as given; `null` for warnings that concern no place in a file.
+    pub file: Option<String>,
+    /// The stable name of the kind: `H0101` (HP-GL), `S0101` (SVG), or one of the codes above.
+    pub code: String,
+    /// `note`, `warning` or `error`.
+    pub severity: String,
+    /// What was found at the first place.
+    pub message: String,
+    /// What to do about it.
+    pub help: Option<String>,
+    /// How often it was found.
+    pub count: u64,
+    /// First byte of the first place, from 0.
+    pub byte: Option<usize>,
+    /// The byte after its last.
+    pub end: Option<usize>,
+    /// Line of the first place, from 1, in formats of lines.
+    pub line: Option<usize>,
+    /// Column of the first place, from 1, in formats of lines.
+    pub column: Option<usize>,
+    /// Number of the command at the first place, from 1, in HP-GL.
+    pub command: Option<usize>,
+    /// Position of the pen at the first place, mm, in HP-GL.
+    pub pen_mm: Option<[f64; 2]>,
 }
 
-/// The two one-sided distances between ink and drawing.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DeviationReport {
-    /// From the ink to the drawing.
-    pub ink_to_drawing: Distances,
-    /// From the drawing to the ink.
-    pub drawing_to_ink: Distances,
-}
-
-/// A distance along a length.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Distances {
-    /// Largest distance, mm.
-    pub max_mm: f64,
-    /// Distance within which 99 % of the length lies, mm.
-    pub p99_mm: f64,
-    /// Whether `max_mm` is a lower bound only.
-    pub more: bool,
-    /// Distance that sampling may have missed, mm.
-    pub unseen_mm: f64,
-}
-
-/// The quantization error of a machine along a plan's ink: half a tick on both motors.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TickFloor {
-    /// At the worst pose, mm.
-    pub worst_mm: f64,
-    /// Root mean square, mm.
-    pub rms_mm: f64,
-}
-
-/// The peaks of one motor.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MotorReport {
-    /// The motor's name.
-    pub name: String,
-    /// Largest first difference of whole ticks, ticks/s.
-    pub speed: f64,
-    /// The speed limit, ticks/s.
-    pub speed_limit: f64,
-    /// Largest share of the speed limit with its rounding allowance.
-    pub speed_share: f64,
-    /// The share that 99.9 % of the rows keep.
-    pub speed_share_p999: f64,
-    /// Largest second difference of whole ticks, ticks/s².
-    pub acceleration: f64,
-    /// The acceleration limit, ticks/s².
-    pub acceleration_limit: f64,
-    /// Largest share of the acceleration limit with its rounding allowance.
-    pub acceleration_share: f64,
-    /// The share that 99.9 % of the rows keep.
-    pub acceleration_share_p999: f64,
-    /// The same for jerk; `null` where the plan has no jerk limit.
-    pub jerk: Option<JerkReport>,
-}
-
-/// The jerk peak of one motor.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct JerkReport {
-    /// Largest third difference of whole ticks, ticks/s³.
-    pub jerk: f64,
-    /// The limit, ticks/s³.
-    pub limit: f64,
-    /// Largest share of the limit with its rounding allowance.
-    pub share: f64,
-    /// The share that 99.9 % of the rows keep.
-    pub share_p999: f64,
-}
-
-impl CertificateReport {
-    /// The report of a certificate of a plan that was compared with its drawing.
-    pub fn of(certificate: &Certificate) -> Self {
+impl Finding {
+    /// A finding in the file of this name.
+    pub fn of(file: &str, diagnostic: &Diagnostic) -> Self {
         Self {
-            holds: certificate.holds,
-            failures: certificate.failures.iter().map(ToString::to_string).collect(),
-            tolerance_mm: certificate.tolerance_mm,
-            before_rounding: certificate.before_rounding.as_ref().map(DeviationReport::of),
-            after_rounding: Some(DeviationReport::of(&certificate.after_rounding)),
-            tick_floor: TickFloor {
-                worst_mm: certificate.quantization_error.worst_mm,
-                rms_mm: certificate.quantization_error.rms_mm,
-            },
-            largest_rounding_ticks: certificate.largest_rounding_ticks,
-            pens: certificate.pens.clone(),
-            motors: certificate.motors.iter().map(MotorReport::of).collect(),
-            rows: certificate.rows,
-            duration_s: certificate.duration_us as f64 * 1e-6,
-            ink_mm: certificate.ink_mm,
-            travel_mm: certificate.travel_mm,
-            pen_downs: certificate.pen_downs,
-            dots: certificate.dots,
+            file: Some(file.to_owned()),
+            code: diagnostic.code.to_owned(),
+            severity: diagnostic.severity.to_string(),
+            message: diagnostic.message.clone(),
+            help: diagnostic.help.clone(),
+            count: diagnostic.count,
+            byte: Some(diagnostic.span.start),
+            end: Some(diagnostic.span.end),
+            line: diagnostic.line_column.map(|[line, _]| line),
+            column: diagnostic.line_column.map(|[_, column]| column),
+            command: diagnostic.command,
+            pen_mm: diagnostic.pen_mm.map(|position| position.map(round::mm)),
         }
     }
 
-    /// The report of a certificate of a plan without a drawing to compare it with.
-    pub fn of_motion(certificate: &Certificate) -> Self {
-        Self { after_rounding: None, ..Self::of(certificate) }
-    }
-}
-
-impl DeviationReport {
-    fn of(deviation: &Deviation) -> Self {
-        let distances = |stats: &DeviationStats| Distances {
-            max_mm: stats.max_mm,
-            p99_mm: stats.p99_mm,
-            more: stats.is_lower_bound,
-            unseen_mm: stats.sampling_error_mm,
-        };
+    /// A warning of the program.
+    pub fn warning(code: Code, message: &str) -> Self {
         Self {
-            ink_to_drawing: distances(&deviation.ink_to_drawing),
-            drawing_to_ink: distances(&deviation.drawing_to_ink),
+            code: code.name().to_owned(),
+            severity: "warning".to_owned(),
+            message: message.to_owned(),
+            count: 1,
+            ..Self::default()
         }
     }
 }
 
-impl MotorReport {
-    fn of(peak: &MotorPeak) -> Self {
+/// Why a command failed.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorReport {
+    /// The kind of failure.
+    pub code: Code,
+    /// The message, as on standard error.
+    pub message: String,
+    /// What to do about it, where that is not part of the message.
+    pub help: Option<String>,
+    /// Where; `null` for failures without a place.
+    pub place: Option<Place>,
+}
+
+/// A place in an input file and on the machine.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Place {
+    /// The file, as given.
+    pub file: String,
+    /// First byte, from 0.
+    pub byte: Option<usize>,
+    /// The byte after the last.
+    pub end: Option<usize>,
+    /// Line, from 1.
+    pub line: Option<usize>,
+    /// Stroke of the drawing in the file's order, from 1.
+    pub stroke: Option<usize>,
+    /// The stroke's pen.
+    pub pen: Option<u16>,
+    /// The point, mm in the machine's frame.
+    pub point_mm: Option<[f64; 2]>,
+}
+
+impl Place {
+    /// A stroke's place in its file, with the point on the machine.
+    pub fn of_stroke(
+        file: &str,
+        span: drawing::Span,
+        stroke: usize,
+        pen: u16,
+        point: drawing::Point,
+    ) -> Self {
         Self {
-            name: peak.name.clone(),
-            speed: peak.speed_ticks_s,
-            speed_limit: peak.speed_limit_ticks_s,
-            speed_share: peak.speed_share,
-            speed_share_p999: peak.speed_share_p999,
-            acceleration: peak.acceleration_ticks_s2,
-            acceleration_limit: peak.acceleration_limit_ticks_s2,
-            acceleration_share: peak.acceleration_share,
-            acceleration_share_p999: peak.acceleration_share_p999,
-            jerk: peak.jerk.map(|peak| JerkReport {
-                jerk: peak.jerk_ticks_s3,
-                limit: peak.limit_ticks_s3,
-                share: peak.share,
-                share_p999: peak.share_p999,
-            }),
+            file: file.to_owned(),
+            byte: Some(span.start),
+            end: Some(span.end),
+            line: None,
+            stroke: Some(stroke + 1),
+            pen: Some(pen),
+            point_mm: Some([point.x, point.y].map(round::mm)),
+        }
+    }
+}
+
+/// An exit code and its meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExitCode {
+    /// The code.
+    pub code: u8,
+    /// A word for it.
+    pub name: &'static str,
+    /// The meaning, the same for all commands.
+    pub meaning: &'static str,
+}
+
+/// The exit codes of the program.
+pub const EXIT_CODES: [ExitCode; 5] = [
+    ExitCode {
+        code: 0,
+        name: "done",
+        meaning: "the command did what was asked, and a plan that was verified holds",
+    },
+    ExitCode {
+        code: 1,
+        name: "refused",
+        meaning: "an input (drawing, plan) cannot be used as asked: not a drawing, no ink, out of reach, \
+                  verification failed, or a warning with --strict",
+    },
+    ExitCode { code: 2, name: "invalid request", meaning: "the command line or the machine file is wrong" },
+    ExitCode {
+        code: 3,
+        name: "input or output failed",
+        meaning: "a file or port cannot be read or written, or the machine does not answer",
+    },
+    ExitCode { code: 130, name: "interrupted", meaning: "Ctrl-C or a termination request while sending" },
+];
+
+macro_rules! codes {
+    ($($variant:ident $name:literal $exit:literal $meaning:literal)*) => {
+        /// The kind of a failure or warning.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Code {
+            $(#[doc = $meaning] $variant,)*
+        }
+
+        impl Code {
+            /// All kinds, in the order of their exit codes.
+            pub const ALL: &[Self] = &[$(Self::$variant),*];
+
+            /// The stable name, as serialized.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),* }
+            }
+
+            /// The exit code of a failure of this kind; 0 for kinds that are warnings only.
+            pub fn exit_code(self) -> u8 {
+                match self { $(Self::$variant => $exit),* }
+            }
+
+            /// The meaning, as a sentence.
+            pub fn meaning(self) -> &'static str {
+                match self { $(Self::$variant => $meaning),* }
+            }
+        }
+    };
+}
+
+codes! {
+    SeveralPages "several-pages" 0 "The file has several pages, and one of them was used."
+    BeyondSheet "beyond-sheet" 0 "Ink reaches beyond the sheet."
+    FormatLoss "format-loss" 0 "The output format or the machine does not carry something that the plan has."
+    PlanMismatch "plan-mismatch" 0 "A plan states something else than the machine or drawing that it is verified with."
+    MotionOnly "motion-only" 0 "Only the motion was verified: no drawing was given."
+    SheetNotReached "sheet-not-reached" 0 "The machine cannot draw on all of its sheet."
+    LostBytes "lost-bytes" 0 "The emulated controller lost bytes because its buffer was full."
+    PenMissing "pen-missing" 0 "No stroke has a pen that an option names."
+    PenColors "pen-colors" 0 "Several drawings give a pen different colours."
+    Foreign "foreign" 1 "The input is no drawing that is read, or not a drawing at all."
+    NotAPlan "not-a-plan" 1 "The input is no plan, or a plan that is damaged or truncated."
+    NoInk "no-ink" 1 "The drawing has no ink."
+    OutOfReach "out-of-reach" 1 "A stroke leaves the reach of the machine."
+    NoPlacement "no-placement" 1 "No placement of the drawing fits the sheet and the machine."
+    TooLong "too-long" 1 "The plan would have too many rows."
+    Format "format" 1 "The output format or the machine cannot represent the plan."
+    OverLimit "over-limit" 1 "The plan exceeds the limits of the motors."
+    Verification "verification" 1 "The certificate does not hold."
+    Strict "strict" 1 "There was a warning, and --strict was given."
+    Drawing "drawing" 1 "The drawing or plan cannot be used for another reason, which the message states."
+    Usage "usage" 2 "The command line is wrong."
+    MachineFile "machine-file" 2 "The machine file is wrong."
+    Io "io" 3 "A file or port cannot be read or written, or the machine does not answer."
+    Interrupted "interrupted" 130 "Interrupted by the user."
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn code_names_are_those_serialized_and_exit_codes_are_listed() {
+        for code in Code::ALL {
+            assert_eq!(serde_json::to_value(code).unwrap(), code.name());
+            assert!(EXIT_CODES.iter().any(|exit| exit.code == code.exit_code()), "{code:?}");
         }
     }
 }

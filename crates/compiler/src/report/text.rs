@@ -116,9 +116,11 @@ fn details(certificate: &Certificate) -> String {
     for peak in &certificate.motors {
         let _ = write!(
             text,
-            "  motor {}: speed at most {:.1} % of its limit (99.9 %: {:.1}), acceleration {:.1} % (99.9 %: {:.1})",
+            "  motor {}: speed at most {:.1} % of its limit{} (99.9 %: {:.1}), acceleration {:.1} % (99.9 %: {:.1})",
             peak.name,
             100.0 * peak.speed_share,
+            // Whole ticks alone do not tell the motion from its rounding.
+            if peak.speed_ticks_s.is_some() { "" } else { " plus rounding" },
             100.0 * peak.speed_share_p999,
             100.0 * peak.acceleration_share,
             100.0 * peak.acceleration_share_p999

@@ -427,6 +427,7 @@ impl Interpreter {
         self.name_white_pens();
         self.report_pages();
         self.note_profile();
+        let white_pens = self.white_pens();
         let profile = self.profile.unwrap_or_default();
         let mut diagnostics = syntax_findings.into_vec();
         diagnostics.extend(self.findings.into_vec());
@@ -440,7 +441,7 @@ impl Interpreter {
             })
             .filter(|&(_, count)| count > 0)
             .collect();
-        let summary = Summary { commands, used, wrappers, profile };
+        let summary = Summary { commands, used, wrappers, profile, white_pens };
         let is_cut = self.frame.portrait_seen()
             && diagnostics.iter().any(|diagnostic| diagnostic.code == codes::CUT_AT_PAGE);
         (Document { pages: self.pages, diagnostics, summary }, is_cut)

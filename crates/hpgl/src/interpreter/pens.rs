@@ -218,6 +218,11 @@ impl Interpreter {
         });
     }
 
+    /// The pens that were white when they drew.
+    pub(super) fn white_pens(&self) -> Vec<Pen> {
+        self.pens.white_drawn.iter().copied().collect()
+    }
+
     /// Gives what pen 0 drew to the first pen that draws nothing else.
     pub(super) fn number_pen_zero(&mut self) {
         let used: BTreeSet<Pen> = self.pages.iter().flat_map(|page| page.drawing.pens()).collect();

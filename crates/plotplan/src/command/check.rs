@@ -2,15 +2,16 @@
 
 use std::fmt::Write as _;
 
-use compiler::import::Severity;
 use compiler::pipeline;
 use compiler::report::text::{length, pluralize};
+use compiler::report::{Code, DrawingReport, MachineReport};
+use kinematics::Machine;
 
 use crate::cli::Check;
 use crate::failure::Failure;
-use crate::input::Inputs;
+use crate::input::{Inputs, LoadedDrawing};
 use crate::machines;
-use crate::{input, output, terminal};
+use crate::{input, output, session, terminal};
 
 pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     let machine = arguments
@@ -25,8 +26,8 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         drawn.crop(arguments.reading.layout.crop);
     }
     let document = &drawn.document;
-    let mut refused = false;
-    let mut text = format!("{}: {}\n", input.name, document.size);
+    session::report(|report| report.drawing = Some(DrawingReport::of(document)));
+    let mut text = format!("{}: {}\n", input.path, document.size);
     for (number, page) in document.pages.iter().enumerate() {
         let drawing = &page.drawing;
         if document.pages.len() > 1 {
@@ -49,39 +50,40 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
             None => text.push_str("no ink\n"),
         }
     }
-    if document.pages.iter().all(|page| page.drawing.is_empty()) {
-        terminal::error("the file draws nothing");
-        refused = true;
+    let verdict = match &machine {
+        Some(machine) => placed(arguments, &inputs, &drawn, &machine.machine, &mut text),
+        None => input::refuse_unusable(&input.path, document),
+    };
+    output::report(&text)?;
+    verdict
+}
+
+/// Whether the machine can draw it, as it would be placed.
+fn placed(
+    arguments: &Check,
+    inputs: &Inputs,
+    drawn: &LoadedDrawing,
+    machine: &Machine,
+    text: &mut String,
+) -> Result<(), Failure> {
+    input::use_page(inputs, drawn, &arguments.reading)?;
+    let drawing = drawn.drawing();
+    let crop = arguments.reading.layout.crop;
+    let request = super::request(&arguments.planning, crop, drawn.page(), machine);
+    let placed = pipeline::place(drawing, machine, &request.placement, request.crop);
+    session::report(|report| {
+        report.machine = Some(MachineReport {
+            can_draw: Some(placed.is_ok()),
+            beyond_sheet_mm: placed.as_ref().ok().map(|placed| placed.beyond_sheet_mm),
+            ..MachineReport::of(machine)
+        });
+    });
+    let placed =
+        placed.map_err(|error| super::convert::explain(inputs, drawing, machine, &request, error))?;
+    let _ = writeln!(text, "{} can draw it", machine.name());
+    let beyond = placed.beyond_sheet_mm;
+    if beyond > 1e-6 {
+        terminal::warning(Code::BeyondSheet, &format!("ink reaches {beyond:.2} mm beyond the sheet"));
     }
-    if let Some(machine) = &machine {
-        let drawing = drawn.drawing();
-        let request = super::request(
-            &arguments.planning,
-            arguments.reading.layout.crop,
-            drawn.page(),
-            &machine.machine,
-        );
-        match pipeline::place(drawing, &machine.machine, &request.placement, request.crop) {
-            Ok(placed) => {
-                let _ = writeln!(text, "{} can draw it", machine.machine.name());
-                let beyond = placed.beyond_sheet_mm;
-                if beyond > 1e-6 {
-                    terminal::warning(&format!("ink reaches {beyond:.2} mm beyond the sheet"));
-                    if arguments.reading.strict {
-                        terminal::error(input::STRICT);
-                        refused = true;
-                    }
-                }
-            }
-            Err(error) => {
-                match super::convert::explain(&inputs, drawing, &machine.machine, &request, error) {
-                    Failure::Refused => refused = true,
-                    other => return Err(other),
-                }
-            }
-        }
-    }
-    output::write("-", |out| out.write_all(text.as_bytes()))?;
-    let loses_ink = document.has(Severity::Error);
-    if refused || loses_ink { Err(Failure::Refused) } else { Ok(()) }
+    input::refuse_warnings(arguments.reading.strict)
 }

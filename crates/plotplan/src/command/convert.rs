@@ -6,26 +6,24 @@ mod names;
 
 use std::collections::BTreeSet;
 
-use annotate_snippets::Level;
 use backends::pen_plotter::plotter::Plotter;
 use backends::{Backend, PlanSource, RowIter, WriteError};
 use compiler::import::Page;
 use compiler::layout::Layout;
 use compiler::pipeline::{self, Compiled, Order, Request};
-use compiler::report::{CertificateReport, Summary, text};
+use compiler::report::{CertificateReport, Code, ErrorReport, OutputReport, Place, Summary, text};
 use compiler::settings::Settings;
 use drawing::{Drawing, Pen, Vec2};
 use kinematics::Machine;
 use planner::{ExactRow, PlacementOptions, PlanError, Scale};
-use serde_json::json;
 
 use self::names::{Names, Part};
-use crate::cli::{Convert, Format, PageChoice, Planning, ReportForm};
+use crate::cli::{Convert, Format, PageChoice, Planning};
 use crate::failure::Failure;
 use crate::input::{self, Inputs};
 use crate::machines::{self, LoadedMachine};
-use crate::output;
 use crate::terminal::{self, Progress};
+use crate::{output, session};
 
 /// What every output of one command has in common.
 struct Job<'a> {
@@ -50,6 +48,9 @@ struct Written {
 pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Failure> {
     // What is wrong with the machine shows before a long read.
     let format = arguments.format().map_err(|what| Failure::Usage(anyhow::anyhow!(what)))?;
+    if let Some(what) = arguments.pen.wrong_positions() {
+        return Err(Failure::Usage(anyhow::anyhow!(what)));
+    }
     let machine = match (format, &arguments.machine) {
         (Format::Hpgl | Format::Svg, None) => None,
         (_, Some(name)) => Some(machines::machine_with_paper(name, &arguments.reading)?),
@@ -70,7 +71,7 @@ pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Fa
     }
     let inputs = Inputs::read(&arguments.files)?;
     for (_, written) in convert_parts(&job, &inputs, &names)? {
-        terminal::say(&written.said);
+        terminal::report(&written.said);
     }
     Ok(())
 }
@@ -80,18 +81,11 @@ pub(crate) fn run(arguments: &Convert, command_line: &[String]) -> Result<(), Fa
 fn convert_parts(job: &Job<'_>, inputs: &Inputs, names: &Names) -> Result<Vec<(String, Written)>, Failure> {
     let arguments = job.arguments;
     let drawn = input::drawings(inputs, &arguments.reading)?;
+    input::use_page(inputs, &drawn, &arguments.reading)?;
     let pages = drawn.document.pages.len();
-    let numbers = match arguments.reading.page {
+    let numbers = match arguments.reading.page() {
         PageChoice::All => 1..=pages,
-        PageChoice::Number(page) => {
-            if pages > 1 {
-                terminal::warning(&format!(
-                    "{} has {pages} pages; this is page {page}, --page takes another",
-                    inputs.name()
-                ));
-            }
-            page..=page
-        }
+        PageChoice::Number(page) => page..=page,
     };
     let name = inputs.name();
     let mut parts = Vec::new();
@@ -133,7 +127,12 @@ fn convert_parts(job: &Job<'_>, inputs: &Inputs, names: &Names) -> Result<Vec<(S
             }
         }
     }
-    if failed { Err(Failure::Refused) } else { Ok(written) }
+    if failed {
+        let message = format!("not all outputs of {name} were written");
+        session::failed(ErrorReport { code: Code::Drawing, message, help: None, place: None });
+        return Err(Failure::Refused);
+    }
+    Ok(written)
 }
 
 /// The order in which strokes are drawn: in drawings the file's, unless another one is asked for, since
@@ -158,35 +157,39 @@ fn plan(
     let request = super::request(&arguments.planning, crop, page, &machine.machine);
     let compiled = compile(inputs, &page.drawing, &machine.machine, &request)?;
     if compiled.beyond_sheet_mm > 1e-6 {
-        terminal::warning(&format!(
+        let what = format!(
             "ink reaches {:.2} mm beyond the sheet (the machine can draw there); --fit keeps it on the sheet",
             compiled.beyond_sheet_mm
-        ));
-        if arguments.reading.strict {
-            terminal::error(input::STRICT);
-            return Err(Failure::Refused);
-        }
+        );
+        terminal::warning(Code::BeyondSheet, &what);
+        input::refuse_warnings(arguments.reading.strict)?;
     }
     let summary = Summary::of(&compiled);
     let certificate = CertificateReport::of(&compiled.certificate);
-    let said = match arguments.report {
-        ReportForm::Text => {
-            let text = text::summary(&machine.machine, &compiled);
-            format!("{text}{}", text::certificate(&compiled.certificate))
-        }
-        ReportForm::Json => format!("{}\n", json!({ "summary": summary, "certificate": certificate })),
-    };
-    if !compiled.may_be_written(request.allow_over_limit) {
-        terminal::error(if compiled.may_be_written(true) {
-            "the plan breaks the motors' limits and is not written; a longer --segment-time may keep them, --allow-over-limit writes it as it is"
-        } else {
-            "the plan does not hold its certificate and is not written; please report this drawing"
+    session::report(|report| {
+        report.outputs.push(OutputReport {
+            file: to.to_owned(),
+            drawing: None,
+            summary: Some(summary.clone()),
+            certificate: Some(certificate.clone()),
         });
-        terminal::say(&said);
+    });
+    let said =
+        format!("{}{}", text::summary(&machine.machine, &compiled), text::certificate(&compiled.certificate));
+    if !compiled.may_be_written(request.allow_over_limit) {
+        if compiled.may_be_written(true) {
+            let what = "the plan breaks the motors' limits and is not written; a longer --segment-time may keep them, --allow-over-limit writes it as it is";
+            terminal::error(Code::OverLimit, what);
+        } else {
+            let what =
+                "the plan does not hold its certificate and is not written; please report this drawing";
+            terminal::error(Code::Verification, what);
+        }
+        terminal::report(&said);
         return Err(Failure::Refused);
     }
     if !compiled.certificate.holds {
-        terminal::warning("the plan breaks the motors' limits, which was allowed");
+        terminal::warning(Code::OverLimit, "the plan breaks the motors' limits, which was allowed");
     }
     let time = text::duration(compiled.header.duration_us as f64 * 1e-6);
     let ink = text::length(compiled.certificate.ink_mm);
@@ -226,7 +229,7 @@ fn plan(
 fn of_part(job: &Job<'_>, part: Part<'_>) -> (Layout, Vec<String>) {
     let mut layout = job.arguments.reading.layout.to_layout();
     let mut command_line = job.command_line.to_vec();
-    if job.arguments.reading.page == PageChoice::All {
+    if job.arguments.reading.page() == PageChoice::All {
         command_line.retain(|option| !option.starts_with("--page="));
         command_line.push(format!("--page={}", part.page));
     }
@@ -255,12 +258,9 @@ fn write_encoded(
     let pens: Vec<u16> = compiled.ordered().pens().into_iter().map(|pen| pen.0).collect();
     let losses = backend.losses(&compiled.header, &pens);
     for loss in &losses {
-        terminal::warning(&loss.to_string());
+        terminal::warning(Code::FormatLoss, &loss.to_string());
     }
-    if arguments.reading.strict && !losses.is_empty() {
-        terminal::error(input::STRICT);
-        return Err(Failure::Refused);
-    }
+    input::refuse_warnings(arguments.reading.strict)?;
     let rows = || -> RowIter<'_> {
         Box::new(compiled.trajectory.rows().map(|ExactRow { row, exact }| (row, exact)))
     };
@@ -302,7 +302,7 @@ pub(super) fn refusal(inputs: &Inputs, error: PlanError) -> Failure {
     match error {
         PlanError::Setting { .. } => Failure::Usage(error.into()),
         other => Failure::Drawing(
-            anyhow::Error::new(other).context(format!("{} cannot be planned", inputs.name())),
+            anyhow::Error::new(other).context(format!("{} cannot be planned", inputs.path())),
         ),
     }
 }
@@ -332,7 +332,8 @@ pub(super) fn explain(
     );
     let help = what_fits(drawing, machine, request);
     let title = format!("the drawing leaves the reach of {}: {source}", machine.name());
-    terminal::at_place(input, span, Level::ERROR, None, &title, &place_text, Some(&help));
+    let place = Place::of_stroke(&input.path, span, *stroke, pen.0, source.point);
+    terminal::error_in_file(input, span, Code::OutOfReach, &title, &place_text, &help, place);
     Failure::Refused
 }
 

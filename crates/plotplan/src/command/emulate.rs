@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use backends::{Device, EmulatorOptions, FaultInjector, InkFrame};
+use compiler::report::Code;
 use drawing::{Point, Rect};
 use kinematics::MotorPos;
-use picture::{Ink, Scene};
+use picture::{Ink, InkLine, Scene};
 
 use crate::cli::Emulate;
 use crate::failure::Failure;
@@ -34,7 +35,8 @@ pub(crate) fn run(arguments: &Emulate) -> Result<(), Failure> {
     serve(arguments, &mut injector, &interrupted).map_err(Failure::Io)?;
     let lost = injector.device().lost_bytes();
     if lost > 0 {
-        terminal::warning(&format!("{lost} bytes were lost because the machine's receive buffer was full"));
+        let what = format!("{lost} bytes were lost because the machine's receive buffer was full");
+        terminal::warning(Code::LostBytes, &what);
     }
     if let Some(to) = &arguments.ink {
         output::write(to, |out| write_ink(injector.device().ink(), out))?;
@@ -165,14 +167,16 @@ fn scene(arguments: &Emulate, machine: Option<&LoadedMachine>, ink: &backends::I
     let lines = ink.lines();
     let ink: Vec<Ink> = lines
         .iter()
-        .map(|(pen, places)| Ink { pen: *pen, points: places.iter().map(place).collect() })
+        .map(|(pen, places)| Ink { pen: *pen, line: InkLine::Points(places.iter().map(place).collect()) })
         .collect();
-    let bounds = ink.iter().flat_map(|ink| &ink.points).fold(None, |bounds: Option<Rect>, point| {
-        let here = Rect::from_points(*point, *point);
+    let points = lines.iter().flat_map(|(_, places)| places.iter().map(place));
+    let bounds = points.fold(None, |bounds: Option<Rect>, point| {
+        let here = Rect::from_points(point, point);
         Some(bounds.map_or(here, |bounds| bounds.union(here)))
     });
     let sheet = machine.map(|machine| machine.machine.sheet()).or(bounds).unwrap_or(Rect::ZERO);
     let reach = machine.map_or_else(Vec::new, |machine| kinematics::reach_outlines(&machine.machine));
     let title = "what the machine drew".to_owned();
-    Scene { title, sheet, reach, ink, colors: picture::PenColors::new(), travel: Vec::new(), start: None }
+    let colors = picture::PenColors::new();
+    Scene { title, sheet, reach, shades: None, ink, colors, travel: Vec::new(), start: None }
 }

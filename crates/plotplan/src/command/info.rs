@@ -6,12 +6,14 @@ use std::fmt::Write as _;
 use compiler::import::{Diagnostic, Fact};
 use compiler::replay;
 use compiler::report::text::{self, duration, length, pluralize};
+use compiler::report::{CertificateReport, DrawingReport, PlanReport, Summary};
+use kinematics::Machine;
 
 use crate::cli::Info;
 use crate::failure::Failure;
-use crate::input::{self, Input, Inputs};
+use crate::input::{self, Input, Inputs, LoadedDrawing};
 use crate::machines;
-use crate::output;
+use crate::{output, session};
 
 /// Lengths are measured along the plan's own ink: any tolerance does.
 const TOLERANCE_MM: f64 = 1.0;
@@ -19,15 +21,14 @@ const TOLERANCE_MM: f64 = 1.0;
 pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
     let inputs = Inputs::read(std::slice::from_ref(&arguments.file))?;
     let input = inputs.first();
-    let text = if plan::file::is_plan(&input.bytes) {
-        of_plan(input, arguments.machine.as_deref())?
+    if plan::file::is_plan(&input.bytes) {
+        output::report(&of_plan(input, arguments.machine.as_deref())?)
     } else {
-        of_drawing(&inputs, arguments)?
-    };
-    output::write("-", |out| out.write_all(text.as_bytes()))
+        of_drawing(&inputs, arguments)
+    }
 }
 
-fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<String, Failure> {
+fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<(), Failure> {
     let input = inputs.first();
     let machine = arguments
         .machine
@@ -39,7 +40,8 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<String, Failure> {
         drawn.crop(arguments.reading.layout.crop);
     }
     let document = &drawn.document;
-    let mut text = format!("drawing  {}\n", input.name);
+    session::report(|report| report.drawing = Some(DrawingReport::of(document)));
+    let mut text = format!("drawing  {}\n", input.path);
     for Fact { key, value } in &document.facts {
         let _ = writeln!(text, "{key:<8} {}", value.replace('\n', "\n         "));
     }
@@ -87,19 +89,31 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<String, Failure> {
         }
     }
     text.push_str(&findings(&document.diagnostics));
-    if let Some(machine) = machine {
-        let request = super::request(
-            &arguments.planning,
-            arguments.reading.layout.crop,
-            drawn.page(),
-            &machine.machine,
-        );
-        let compiled = super::convert::compile(inputs, drawn.drawing(), &machine.machine, &request)?;
-        text.push('\n');
-        text.push_str(&text::summary(&machine.machine, &compiled));
-        text.push_str(&text::certificate(&compiled.certificate));
-    }
-    Ok(text)
+    let planned = match machine {
+        Some(machine) => planned(arguments, inputs, &drawn, &machine.machine),
+        None => input::refuse_unusable(&input.path, document).map(|()| String::new()),
+    };
+    text.push_str(planned.as_deref().unwrap_or_default());
+    output::report(&text)?;
+    planned.map(|_| ())
+}
+
+/// The summary of the plan that `convert` would write.
+fn planned(
+    arguments: &Info,
+    inputs: &Inputs,
+    drawn: &LoadedDrawing,
+    machine: &Machine,
+) -> Result<String, Failure> {
+    input::use_page(inputs, drawn, &arguments.reading)?;
+    let crop = arguments.reading.layout.crop;
+    let request = super::request(&arguments.planning, crop, drawn.page(), machine);
+    let compiled = super::convert::compile(inputs, drawn.drawing(), machine, &request)?;
+    session::report(|report| {
+        report.summary = Some(Summary::of(&compiled));
+        report.certificate = Some(CertificateReport::of(&compiled.certificate));
+    });
+    Ok(format!("\n{}{}", text::summary(machine, &compiled), text::certificate(&compiled.certificate)))
 }
 
 /// What the reader reported, one line a code.
@@ -117,7 +131,7 @@ fn findings(diagnostics: &[Diagnostic]) -> String {
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
     let (plan, machine) = super::verify::plan(input, machine)?;
     let header = &plan.table.header;
-    let mut text = format!("plan     {}\n", input.name);
+    let mut text = format!("plan     {}\n", input.path);
     let _ = writeln!(text, "machine  {}", header.machine);
     let _ = writeln!(text, "time     {}", duration(header.duration_us as f64 * 1e-6));
     let _ = writeln!(text, "rows     {} every {} us", header.rows, header.period_us);
@@ -130,6 +144,7 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
         );
     }
     let certificate = replay::certify(&plan, &machine.machine, None, TOLERANCE_MM);
+    session::report(|report| report.plan = Some(PlanReport::of(header, &certificate)));
     let _ = writeln!(text, "ink      {}", length(certificate.ink_mm));
     let _ = writeln!(text, "travel   {}", length(certificate.travel_mm));
     let _ = writeln!(text, "pens     {:?}, down {} times", certificate.pens, certificate.pen_downs);

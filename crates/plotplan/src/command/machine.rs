@@ -2,112 +2,89 @@
 
 use std::fmt::Write as _;
 
-use compiler::machine_file::PRESETS;
-use drawing::{Line, Point, Segment};
+use compiler::report::{Code, MachineReport, MachineSource};
 
 use crate::cli::Machine;
 use crate::failure::Failure;
 use crate::machines;
-use crate::{output, terminal};
+use crate::{output, session, terminal};
 
 pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
-    let text = match arguments {
-        Machine::List => list(),
+    match arguments {
+        Machine::List => output::report(&list()),
         Machine::Show { name } => {
             // Only a machine that can be used is shown.
             machines::machine(name)?;
-            machines::machine_toml(name)?
+            let text = machines::machine_toml(name)?;
+            output::write("-", |out| out.write_all(text.as_bytes()))
         }
-        Machine::Check { file } => check(file)?,
-    };
-    output::write("-", |out| out.write_all(text.as_bytes()))
+        Machine::Check { file } => output::report(&check(file)?),
+        Machine::Preview { name, output, format } => super::preview::machine(name, output, *format),
+    }
 }
 
-/// The presets, and the user's own machines.
+/// The presets and the user's own machines, those that cannot be used marked.
 fn list() -> String {
+    let machines = machines::listed();
     let mut text = String::new();
-    let own = machines::own_machine_files();
-    for preset in PRESETS.iter().filter(|preset| own.iter().all(|(name, _)| name != preset.name)) {
-        let _ = writeln!(text, "{:<10} {}", preset.name, preset.about);
+    for machine in &machines {
+        let own = if machine.source == MachineSource::Own { "your own: " } else { "" };
+        let _ = write!(text, "{:<10} {own}{}", machine.name, machine.about);
+        if machine.hides_preset {
+            text.push_str("; hides the preset of this name");
+        }
+        if let Some(error) = &machine.error {
+            let first = error.lines().next().unwrap_or_default();
+            let _ = write!(text, "; CANNOT BE USED: {first} (plotplan machine check {})", machine.name);
+        }
+        text.push('\n');
     }
-    for (name, path) in own {
-        let _ = writeln!(text, "{name:<10} your own: {}", path.display());
-    }
+    session::report(|report| report.machines = Some(machines));
     text
 }
 
 fn check(file: &str) -> Result<String, Failure> {
+    session::report(|report| report.inputs.push(file.to_owned()));
     let machine = machines::machine(file)?.machine;
-    let sheet = machine.sheet();
-    let mut text = format!("{} is valid\n", machine.name());
-    let joints = machine.mechanism().joint_names();
-    for (k, motor) in machine.motors().iter().enumerate() {
-        let row = machine.coupling().rows()[k];
+    let report = MachineReport::of(&machine);
+    let mut text = format!("{} is valid\n", report.name);
+    for motor in &report.motors {
         let _ = write!(
             text,
             "motor {}: {:.4} * ({} {} + {} {}) + {:.4} ticks, at most {:.1} ticks/s, {:.1} ticks/s2",
-            motor.name,
+            motor.limits.name,
             motor.ticks_per_unit,
-            row[0],
-            joints[0],
-            row[1],
-            joints[1],
+            motor.row[0],
+            report.joints[0],
+            motor.row[1],
+            report.joints[1],
             motor.offset_ticks,
-            motor.max_speed_ticks_s,
-            motor.max_acceleration_ticks_s2
+            motor.limits.speed_ticks_s,
+            motor.limits.acceleration_ticks_s2
         );
-        if let Some(jerk) = motor.max_jerk_ticks_s3 {
+        if let Some(jerk) = motor.limits.jerk_ticks_s3 {
             let _ = write!(text, ", {jerk:.1} ticks/s3");
         }
         text.push('\n');
     }
-    let start = machine.motor_positions(&machine.start());
-    let _ = writeln!(text, "start at ticks {}, {}", start[0].round(), start[1].round());
-    let middle = sheet.center();
-    if let Ok(pose) = machine.pose_near(middle, &machine.start()) {
-        let _ = writeln!(
-            text,
-            "tick floor in the middle of the sheet: {:.4} mm",
-            machine.quantization_error(&pose)
-        );
+    let _ = writeln!(text, "start at ticks {}, {}", report.start_ticks[0], report.start_ticks[1]);
+    if let Some(floor) = report.tick_floor_mm {
+        let _ = writeln!(text, "tick floor in the middle of the sheet: {floor:.4} mm");
     }
-    let corners = [
-        Point::new(sheet.x0, sheet.y0),
-        Point::new(sheet.x1, sheet.y0),
-        Point::new(sheet.x1, sheet.y1),
-        Point::new(sheet.x0, sheet.y1),
-    ];
-    let mut whole = true;
-    for (k, name) in ["lower", "right", "upper", "left"].into_iter().enumerate() {
-        let edge = Segment::Line(Line::new(corners[k], corners[(k + 1) % 4]));
-        if let Err(out) = machine.check_segment(&edge) {
-            whole = false;
-            terminal::warning(&format!("not all of the sheet's {name} edge can be drawn: {out}"));
-        }
+    for edge in &report.sheet.unreached_edges {
+        terminal::warning(Code::SheetNotReached, edge);
     }
-    // An arm may reach all edges and not the middle.
-    let steps = 40;
-    let missed = (1..steps)
-        .flat_map(|i| (1..steps).map(move |j| (i, j)))
-        .filter(|(i, j)| {
-            let at = |low: f64, size: f64, k: i32| low + size * f64::from(k) / f64::from(steps);
-            let p = Point::new(at(sheet.x0, sheet.width(), *i), at(sheet.y0, sheet.height(), *j));
-            machine.check_point(p).is_err()
-        })
-        .count();
-    if missed > 0 {
-        whole = false;
-        let share = 100.0 * missed as f64 / f64::from((steps - 1) * (steps - 1));
-        terminal::warning(&format!("about {share:.0} % of the sheet's inside is out of reach"));
+    if report.sheet.unreached_share > 0.0 {
+        let share = 100.0 * report.sheet.unreached_share;
+        let what = format!("about {share:.0} % of the sheet's inside is out of reach");
+        terminal::warning(Code::SheetNotReached, &what);
     }
+    let [x0, y0, x1, y1] = report.sheet.bounds_mm;
     let _ = writeln!(
         text,
-        "sheet {:.2}, {:.2} to {:.2}, {:.2} mm: {}",
-        sheet.x0,
-        sheet.y0,
-        sheet.x1,
-        sheet.y1,
-        if whole { "all of it can be drawn on" } else { "parts of it cannot be drawn on" }
+        "sheet {x0:.2}, {y0:.2} to {x1:.2}, {y1:.2} mm: {}",
+        if report.sheet.is_reached { "all of it can be drawn on" } else { "parts of it cannot be drawn on" }
     );
+    session::report(|all| all.machine = Some(report));
     Ok(text)
 }

@@ -7,35 +7,59 @@ use compiler::{layout, scene};
 use picture::Scene;
 
 use super::convert::clean;
-use crate::cli::Preview;
+use crate::cli::{PictureFormat, Preview};
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
 use crate::machines;
-use crate::output;
+use crate::{output, session};
 
 /// A picture's longer side, pixels.
 const PIXELS: u32 = 1600;
 
 pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
-    let kind = Path::new(&arguments.output).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    let png = match kind.as_deref() {
-        Some("svg") => false,
-        Some("png") => true,
-        _ => {
-            let what = format!("{}: a picture is NAME.svg or NAME.png", arguments.output);
-            return Err(Failure::Usage(anyhow::anyhow!(what)));
-        }
-    };
+    let format = format(&arguments.output, arguments.format)?;
     let inputs = Inputs::read(&arguments.files)?;
     let scene = match inputs.single().filter(|input| plan::file::is_plan(&input.bytes)) {
         Some(input) => of_plan(input, arguments.machine.as_deref())?,
         None => of_drawing(&inputs, arguments)?,
     };
-    if png {
-        let bytes = picture::png::encode(&scene, PIXELS).map_err(|error| Failure::Drawing(error.into()))?;
-        output::write(&arguments.output, |out| out.write_all(&bytes))
-    } else {
-        output::write(&arguments.output, |out| picture::scene::svg(&scene, out))
+    write(&scene, &arguments.output, format)
+}
+
+/// A picture of a machine without a drawing.
+pub(super) fn machine(name: &str, output: &str, asked: Option<PictureFormat>) -> Result<(), Failure> {
+    let format = format(output, asked)?;
+    session::report(|report| report.inputs.push(name.to_owned()));
+    write(&scene::of_machine(&machines::machine(name)?.machine), output, format)
+}
+
+/// The format asked for, by name or by the extension of the output.
+fn format(output: &str, asked: Option<PictureFormat>) -> Result<PictureFormat, Failure> {
+    let extension = Path::new(output).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let by_extension = match extension.as_deref() {
+        Some("svg") => Some(PictureFormat::Svg),
+        Some("png") => Some(PictureFormat::Png),
+        _ => None,
+    };
+    let wrong = |what: String| Err(Failure::Usage(anyhow::anyhow!(what)));
+    match (asked, by_extension) {
+        (Some(asked), Some(by_extension)) if asked != by_extension => {
+            wrong(format!("--format contradicts the extension of {output}"))
+        }
+        (Some(format), _) | (None, Some(format)) => Ok(format),
+        (None, None) if output == "-" => Ok(PictureFormat::Svg),
+        (None, None) => wrong(format!("{output}: a picture is NAME.svg or NAME.png; or give --format")),
+    }
+}
+
+fn write(scene: &Scene, output: &str, format: PictureFormat) -> Result<(), Failure> {
+    match format {
+        PictureFormat::Svg => output::write(output, |out| picture::scene::svg(scene, out)),
+        PictureFormat::Png => {
+            let bytes =
+                picture::png::encode(scene, PIXELS).map_err(|error| Failure::Drawing(error.into()))?;
+            output::write(output, |out| out.write_all(&bytes))
+        }
     }
 }
 
@@ -46,15 +70,12 @@ fn of_drawing(inputs: &Inputs, arguments: &Preview) -> Result<Scene, Failure> {
         .map(|name| machines::machine_with_paper(name, &arguments.reading))
         .transpose()?;
     let drawn = input::drawings(inputs, &arguments.reading)?;
+    input::use_page(inputs, &drawn, &arguments.reading)?;
     let colors = scene::pen_colors(drawn.page());
     let crop = arguments.reading.layout.crop;
     let name = inputs.name();
     let Some(machine) = machine else {
         let target = clean::target(None, &arguments.reading)?;
-        // Without any ink there is nothing to place: an empty picture.
-        if drawn.drawing().is_empty() {
-            return Ok(scene::of_drawing(&name, drawn.drawing(), clean::page_rect(target), colors));
-        }
         let placement = super::placement(&arguments.planning.placement);
         let arranged = pipeline::arrange(drawn.drawing(), target, &placement, crop, &Order::File)
             .map_err(|error| super::convert::refusal(inputs, error))?;

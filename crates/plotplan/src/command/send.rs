@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use backends::pen_plotter::plotter::{Handshake, Plotter};
 use backends::{Backend, Outcome, PlanSource, Program, ProgramError, RowIter, Session, SessionOptions};
 use compiler::import;
+use compiler::report::{Code, SendEnd, SendReport};
 use plan::TickTable;
 use serialport::FlowControl;
 
@@ -16,10 +17,13 @@ use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::port::Settings;
 use crate::wire::Wire;
-use crate::{output, terminal};
+use crate::{output, session, terminal};
 
 pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let backend = arguments.protocol.0;
+    if let Some(what) = arguments.pen.wrong_positions() {
+        return Err(Failure::Usage(anyhow::anyhow!(what)));
+    }
     let input = input::read(&arguments.plan)?;
     let program = program(arguments, backend, &input)?;
     if arguments.dry_run {
@@ -69,6 +73,7 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     };
     // Standard input has the plan, or the operator's keys.
     let outcome = wire.run(&mut *session, arguments.reconnect, arguments.plan != "-");
+    session::report(|report| report.sending = Some(sent(arguments, path, &outcome, &*session)));
     report(&outcome, &*session, wire.is_interrupted(), backend.row_name())
 }
 
@@ -114,7 +119,7 @@ fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Pro
         if backend.name() == "hpgl" {
             refuse_other_drawings(input)?;
         }
-        let what = || format!("{} is not a plan; this protocol sends plans (ticks, csv or json)", input.name);
+        let what = || format!("{} is not a plan; this protocol sends plans (ticks, csv or json)", input.path);
         return backend.parse_program(&input.bytes).ok_or_else(|| Failure::Drawing(anyhow::anyhow!(what())));
     }
     let (table, machine) = if backend.needs_machine() {
@@ -122,7 +127,7 @@ fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Pro
         (plan.table, Some(machine.machine))
     } else {
         let plan = plan::file::read(&input.bytes);
-        let plan = plan.with_context(|| format!("{} is not a plan that can be used", input.name));
+        let plan = plan.with_context(|| format!("{} is not a plan that can be used", input.path));
         (plan.map_err(Failure::Drawing)?.table, None)
     };
     warn_of_losses(backend, &table);
@@ -159,7 +164,7 @@ fn warn_of_losses(backend: &dyn Backend, table: &TickTable) {
     pens.sort_unstable();
     pens.dedup();
     for loss in backend.losses(&table.header, &pens) {
-        terminal::warning(&loss.to_string());
+        terminal::warning(Code::FormatLoss, &loss.to_string());
     }
 }
 
@@ -177,6 +182,28 @@ fn dry_run(arguments: &Send, program: &Program) -> Result<(), Failure> {
     })
 }
 
+/// What was sent, for the report.
+fn sent(arguments: &Send, port: &str, outcome: &Outcome, session: &dyn Session) -> SendReport {
+    let progress = session.progress();
+    let (end, row) = match outcome {
+        Outcome::Done => (SendEnd::Done, None),
+        Outcome::Stopped { row } => (SendEnd::Stopped, Some(*row)),
+        Outcome::Failed { row, .. } => (SendEnd::Failed, Some(*row)),
+    };
+    SendReport {
+        protocol: arguments.protocol.0.protocol().map_or("", |(name, _)| name).to_owned(),
+        port: port.to_owned(),
+        end,
+        lines: progress.lines as u64,
+        of_lines: progress.of_lines as u64,
+        retransmitted: progress.retransmitted as u64,
+        acknowledged: progress.acknowledged,
+        row: row.unwrap_or(progress.row),
+        last_sent_row: progress.last_sent_row,
+        resume: row.map(resume_command),
+    }
+}
+
 /// Reports how it ended, and how to resume.
 fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool, name: &str) -> Result<(), Failure> {
     let progress = session.progress();
@@ -186,7 +213,7 @@ fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool, name: &st
     }
     let failed = |text: String| {
         if interrupted {
-            terminal::error(&text);
+            terminal::error(Code::Interrupted, &text);
             return Err(Failure::Interrupted);
         }
         Err(Failure::Io(anyhow::anyhow!(text)))
@@ -199,14 +226,14 @@ fn report(outcome: &Outcome, session: &dyn Session, interrupted: bool, name: &st
             Ok(())
         }
         Outcome::Stopped { row } if !progress.acknowledged => {
-            terminal::say(&format!(
+            terminal::always(&format!(
                 "stopped after sending everything up to {name} {row}; the machine acknowledged nothing. Check that the pen is up, then resume with\n  {}\n",
                 resume_command(*row)
             ));
             Err(Failure::Interrupted)
         }
         Outcome::Stopped { row } => {
-            terminal::say(&format!(
+            terminal::always(&format!(
                 "stopped at {name} {row} with the pen up{extra}; resume with\n  {}\n",
                 resume_command(*row)
             ));

@@ -5,17 +5,16 @@
 
 use anyhow::Context as _;
 use compiler::machine_file::MachineFile;
-use compiler::report::{CertificateReport, text};
+use compiler::report::{CertificateReport, Code, ErrorReport, text};
 use compiler::{layout, replay};
 use drawing::Affine;
 use plan::file::PlanFile;
-use serde_json::json;
 
-use crate::cli::{ReportForm, Verify};
+use crate::cli::Verify;
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
 use crate::machines::{self, LoadedMachine};
-use crate::{output, terminal};
+use crate::{output, session, terminal};
 
 /// The tolerance of plans that state none.
 const DEFAULT_TOLERANCE_MM: f64 = 0.1;
@@ -41,25 +40,32 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);
     let certificate = replay::certify(&plan, &machine.machine, drawing.as_ref(), tolerance);
-    if arguments.report == ReportForm::Text {
-        for mismatch in &mismatches {
-            terminal::warning(mismatch);
-        }
+    for mismatch in &mismatches {
+        terminal::warning(Code::PlanMismatch, mismatch);
     }
-    let text = match (arguments.report, drawing.is_some()) {
-        (ReportForm::Text, true) => text::certificate(&certificate),
-        (ReportForm::Text, false) => {
-            terminal::warning("without --drawing only the motion is verified, not what it draws");
-            text::motion(&certificate)
-        }
-        (ReportForm::Json, compared) => {
-            let report =
-                if compared { CertificateReport::of } else { CertificateReport::of_motion }(&certificate);
-            format!("{}\n", json!({ "certificate": report, "mismatches": mismatches }))
-        }
+    let (text, report) = if drawing.is_some() {
+        (text::certificate(&certificate), CertificateReport::of(&certificate))
+    } else {
+        let what = "without --drawing only the motion is verified, not what it draws";
+        terminal::warning(Code::MotionOnly, what);
+        (text::motion(&certificate), CertificateReport::of_motion(&certificate))
     };
-    output::write("-", |out| out.write_all(text.as_bytes()))?;
-    if certificate.holds { Ok(()) } else { Err(Failure::Refused) }
+    session::report(|all| {
+        all.certificate = Some(report);
+        all.mismatches = Some(mismatches);
+    });
+    output::report(&text)?;
+    if !certificate.holds {
+        // The text names what failed; there is no need for another message.
+        session::failed(ErrorReport {
+            code: Code::Verification,
+            message: certificate.failures.first().map_or_else(String::new, ToString::to_string),
+            help: None,
+            place: None,
+        });
+        return Err(Failure::Refused);
+    }
+    input::refuse_warnings(arguments.reading.strict)
 }
 
 /// Reports a drawing that is not the one that the plan document names, by its SHA-256.
@@ -69,7 +75,7 @@ fn other_drawing(plan: &PlanFile, drawing: &Inputs) -> Option<String> {
     (!stated.eq_ignore_ascii_case(&found)).then(|| {
         format!(
             "{} is not the drawing that the plan was made from: SHA-256 {found}, in the plan {stated}",
-            drawing.name()
+            drawing.path()
         )
     })
 }
@@ -78,7 +84,7 @@ fn other_drawing(plan: &PlanFile, drawing: &Inputs) -> Option<String> {
 /// its name.
 pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, LoadedMachine), Failure> {
     let plan = plan::file::read(&input.bytes)
-        .with_context(|| format!("{} is not a plan that can be used", input.name))
+        .with_context(|| format!("{} is not a plan that can be used", input.path))
         .map_err(Failure::Drawing)?;
     let machine = match (machine, &plan.document) {
         (Some(name), _) => machines::machine(name)?,

@@ -5,11 +5,13 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
+use compiler::report::{Code, ErrorReport};
+
 use super::names::{Names, Part};
 use super::{Job, Written};
 use crate::failure::Failure;
 use crate::input::{self, Inputs};
-use crate::terminal;
+use crate::{session, terminal};
 
 /// Converts each file. The others are written even if one fails; then the command fails.
 pub(super) fn run(job: &Job<'_>, names: &Names) -> Result<(), Failure> {
@@ -46,18 +48,24 @@ pub(super) fn run(job: &Job<'_>, names: &Names) -> Result<(), Failure> {
         for (index, result) in receiver {
             waiting.insert(index, result);
             while let Some((is_written, text)) = waiting.remove(&printed) {
-                terminal::say(&text);
+                terminal::always(&text);
                 converted += usize::from(is_written);
                 printed += 1;
             }
         }
     });
     terminal::say(&format!("{converted} of {} drawings converted\n", files.len()));
-    if converted == files.len() { Ok(()) } else { Err(Failure::Refused) }
+    if converted == files.len() {
+        return Ok(());
+    }
+    let message = format!("{} of {} drawings were not converted", files.len() - converted, files.len());
+    session::failed(ErrorReport { code: Code::Drawing, message, help: None, place: None });
+    Err(Failure::Refused)
 }
 
 /// Converts one file, and prints a line about it. Whether it was written.
 fn convert(job: &Job<'_>, file: &str, names: &Names) -> bool {
+    session::next_drawing();
     let result =
         Inputs::read(&[file.to_owned()]).and_then(|inputs| super::convert_parts(job, &inputs, names));
     match result {
@@ -70,7 +78,7 @@ fn convert(job: &Job<'_>, file: &str, names: &Names) -> bool {
         Err(failure) => {
             // Reported with its own code elsewhere; here the file's name comes first.
             failure.describe(file);
-            terminal::say(&format!("{file}: not converted\n"));
+            terminal::always(&format!("{file}: not converted\n"));
             false
         }
     }

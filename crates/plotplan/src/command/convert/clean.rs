@@ -8,18 +8,17 @@ use compiler::import::Page;
 use compiler::paper;
 use compiler::pipeline::{self, Arranged, Target};
 use compiler::report::text::{length, pluralize};
+use compiler::report::{ArrangedReport, Code, OutputReport};
 use compiler::scene;
 use drawing::Rect;
 use kinematics::Machine;
-use serde_json::json;
 
 use super::{Job, Written};
-use crate::cli::{Format, Reading, ReportForm};
+use crate::cli::{Format, Reading};
 use crate::command;
 use crate::failure::Failure;
 use crate::input::{self, Inputs};
-use crate::output;
-use crate::terminal;
+use crate::{output, session, terminal};
 
 /// Places, crops and orders the drawing of a page, and writes it.
 pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Result<Written, Failure> {
@@ -59,11 +58,16 @@ pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Re
             out.write_all(&hpgl::emit(&arranged.drawing, &options))
         }
     })?;
-    let said = match (arguments.report, arranged.ordering) {
-        (ReportForm::Text, None) => String::new(),
-        (ReportForm::Text, Some(report)) => text_report(&report, machine.is_some()),
-        (ReportForm::Json, report) => json_report(&arranged, report),
-    };
+    session::report(|report| {
+        report.outputs.push(OutputReport {
+            file: to.to_owned(),
+            drawing: Some(ArrangedReport::of(&arranged)),
+            summary: None,
+            certificate: None,
+        });
+    });
+    let said =
+        arranged.ordering.as_ref().map_or_else(String::new, |report| text_report(report, machine.is_some()));
     let strokes = pluralize(arranged.drawing.strokes.len(), "stroke");
     let line = format!("{strokes}, {} of ink", length(arranged.drawing.length()));
     Ok(Written { said, line })
@@ -116,15 +120,12 @@ fn warn_beyond(arranged: &Arranged, strict: bool) -> Result<(), Failure> {
     if arranged.beyond_sheet_mm <= 1e-6 {
         return Ok(());
     }
-    terminal::warning(&format!(
+    let what = format!(
         "ink reaches {:.2} mm beyond the sheet; --fit keeps it on the sheet, --crop sheet cuts it off",
         arranged.beyond_sheet_mm
-    ));
-    if strict {
-        terminal::error(input::STRICT);
-        return Err(Failure::Refused);
-    }
-    Ok(())
+    );
+    terminal::warning(Code::BeyondSheet, &what);
+    input::refuse_warnings(strict)
 }
 
 fn text_report(report: &ordering::Report, by_time: bool) -> String {
@@ -140,17 +141,4 @@ fn text_report(report: &ordering::Report, by_time: bool) -> String {
         let _ = writeln!(text, "         {after:.1} s, in the file's order {before:.1} s");
     }
     text
-}
-
-fn json_report(arranged: &Arranged, report: Option<ordering::Report>) -> String {
-    let drawing = &arranged.drawing;
-    let summary = json!({
-        "strokes": drawing.strokes.len(),
-        "ink_mm": drawing.length(),
-        "pens": drawing.pens().iter().map(|pen| pen.0).collect::<Vec<_>>(),
-        "beyond_sheet_mm": arranged.beyond_sheet_mm,
-        "travel_mm": report.map(|report| report.travel_mm_after),
-        "travel_in_file_order_mm": report.map(|report| report.travel_mm_before),
-    });
-    format!("{}\n", json!({ "summary": summary }))
 }

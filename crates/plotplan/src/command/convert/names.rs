@@ -28,7 +28,7 @@ impl Names {
     /// The names that the options ask for, for files of this format.
     pub(super) fn of(arguments: &Convert, format: Format) -> Self {
         let output = &arguments.output;
-        let pages = arguments.reading.page == PageChoice::All;
+        let pages = arguments.reading.page() == PageChoice::All;
         let pens = arguments.split.is_some();
         let mut pattern = output.clone();
         if is_folder(output) {
