@@ -235,7 +235,7 @@ pub struct Arranged {
 }
 
 /// Places, crops and orders a drawing: for a machine as [`compile`] does, otherwise by the length of
-/// travel, from the sheet's lower-left corner and back.
+/// travel between strokes: where the pen starts is not known.
 ///
 /// # Errors
 /// Those of [`place`]; on a plane, options that need a sheet.
@@ -268,9 +268,7 @@ pub fn arrange(
             (ordered, Some(report))
         }
         (Order::Optimize(options), _) => {
-            let home = Some(corner.to_point());
-            let options = ordering::Options { start: home, park: home, ..options.clone() };
-            let (ordered, report) = ordering::optimize(placed.drawing, &by_distance, &options);
+            let (ordered, report) = ordering::optimize(placed.drawing, &by_distance, options);
             (ordered, Some(report))
         }
     };

@@ -237,6 +237,12 @@ pub(crate) struct Reading {
     /// SVG: draw the outlines of shapes that have a fill but no stroke
     #[arg(long)]
     pub(crate) outline_fills: bool,
+    /// SVG: how text is drawn
+    #[arg(long, value_enum, default_value_t = TextForm::Strokes)]
+    pub(crate) text: TextForm,
+    /// With --text outlines: a font file to use instead of the system's fonts
+    #[arg(long, value_name = "FILE")]
+    pub(crate) font: Vec<String>,
     /// SVG: pixels per inch; 96, or 72 for old files of Illustrator, if not given
     #[arg(long, value_name = "NUMBER", value_parser = dpi)]
     pub(crate) dpi: Option<f64>,
@@ -295,7 +301,7 @@ impl Reading {
     }
 
     /// The options of the drawing's importer.
-    pub(crate) fn options(&self) -> import::Options {
+    pub(crate) fn options(&self, fonts: Option<import::Fonts>) -> import::Options {
         let made_for = self.made_for.as_ref().map(|text| match text.split_once(',') {
             Some((plotter, paper)) => (plotter.to_owned(), Some(paper.to_owned())),
             None => (text.clone(), None),
@@ -303,6 +309,7 @@ impl Reading {
         let by_plotter = || self.plotter.as_ref().map(|plotter| (plotter.clone(), self.paper.clone()));
         let (plotter, paper) = made_for.or_else(by_plotter).unzip();
         import::Options {
+            fonts,
             plotter,
             paper: paper.flatten(),
             skip_white_pens: self.white_pens == WhitePens::Skip,
@@ -327,6 +334,15 @@ pub(crate) enum WhitePens {
     Draw,
     /// It is left out
     Skip,
+}
+
+/// How the text of an SVG file is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TextForm {
+    /// In the built-in stroke font: the same everywhere
+    Strokes,
+    /// As outlines of the system's fonts, or of --font
+    Outlines,
 }
 
 /// How the pens of an SVG file are numbered.

@@ -14,7 +14,7 @@ use drawing::{Drawing, Span};
 
 use crate::cli::{self, PageChoice};
 use crate::failure::Failure;
-use crate::{session, terminal};
+use crate::{fonts, session, terminal};
 
 /// A file's bytes and what to call it.
 pub(crate) struct Input {
@@ -167,7 +167,7 @@ impl LoadedDrawing {
 
 /// Reads a drawing and prints its diagnostics. With `--strict` a warning stops here.
 pub(crate) fn drawing(input: &Input, arguments: &cli::Reading) -> Result<LoadedDrawing, Failure> {
-    let options = arguments.options();
+    let options = arguments.options(fonts::of(arguments)?);
     let mut loaded = load(input, arguments, &options)?;
     let layout = arguments.layout.to_layout();
     for page in &mut loaded.document.pages {
@@ -188,7 +188,7 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }
     let layout = arguments.layout.to_layout();
-    let options = arguments.options();
+    let options = arguments.options(fonts::of(arguments)?);
     let formats: Vec<&str> = inputs.0.iter().map(|input| import::format(&input.bytes)).collect();
     let mut pages = Vec::new();
     for (input, format) in inputs.0.iter().zip(&formats) {

@@ -10,6 +10,7 @@ use crate::failure::Failure;
 mod cli;
 mod command;
 mod failure;
+mod fonts;
 mod input;
 mod keys;
 mod machines;

@@ -32,7 +32,7 @@ const ORDERING: [&str; 3] = ["effort", "keep_direction", "pen_order"];
 /// Options of the firmware's pen.
 const PEN: [&str; 2] = ["pen_by", "pen_positions"];
 /// Options of the reader of a drawing.
-const READING: [&str; 14] = [
+const READING: [&str; 16] = [
     "page",
     "plotter",
     "made_for",
@@ -41,6 +41,8 @@ const READING: [&str; 14] = [
     "pens",
     "hatch",
     "outline_fills",
+    "text",
+    "font",
     "dpi",
     "only_pens",
     "pen_map",
@@ -60,7 +62,12 @@ pub(crate) fn without_effect(matches: &ArgMatches) -> Option<String> {
         "verify" if !options.has("drawing") => options.refuse(&READING, "without --drawing"),
         _ => None,
     };
-    of_command.or_else(|| options.refuse(&["gap"], "without --copies").filter(|_| !options.has("copies")))
+    of_command
+        .or_else(|| options.refuse(&["gap"], "without --copies").filter(|_| !options.has("copies")))
+        .or_else(|| {
+            let is_outlines = options.text("text") == "outlines";
+            options.refuse(&["font"], "without --text outlines").filter(|_| !is_outlines)
+        })
 }
 
 /// The options of one command.
@@ -192,7 +199,7 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 35] = [
+    const VALUES: [(&str, Option<&str>); 37] = [
         ("--tolerance", Some("0.2mm")),
         ("--period", Some("20ms")),
         ("--order", Some("optimize")),
@@ -226,6 +233,8 @@ mod tests {
         ("--gap", Some("5mm")),
         ("--crop", Some("sheet")),
         ("--split", Some("pens")),
+        ("--text", Some("outlines")),
+        ("--font", Some("a.ttf")),
         ("--machine", Some("corexy")),
         ("--white-pens", Some("skip")),
     ];

@@ -82,12 +82,13 @@ codes! {
     FOREIGN_OBJECT = 207 "S0207" Warning "foreignObject not drawn"
         "The element holds HTML or another language inside SVG. It is not drawn. Export the drawing with text as SVG \
          text or as paths."
-    TEXT_FONT = 208 "S0208" Warning "text in the stroke font"
+    TEXT_FONT = 208 "S0208" Warning "text in another font"
         "Text is drawn with the built-in single-stroke font at its place, size and anchor; its letters have other \
-         shapes and widths than those of the font that the file names. For these, convert the text to paths in an \
-         editor."
+         shapes and widths than those of the font that the file names. For these, draw text as outlines (--text \
+         outlines), or convert it to paths in an editor. The same is reported where outlines come from another font \
+         than the one that the file names."
     UNKNOWN_CHARACTER = 209 "S0209" Warning "character not drawn"
-        "The built-in stroke font lacks a character. Its place stays empty. Convert the text to paths in an editor."
+        "The font lacks a character. Its place stays empty. Convert the text to paths in an editor."
     TEXT_NOT_DRAWN = 210 "S0210" Warning "text not drawn"
         "Text flowed into a shape by a draft of SVG 1.2, or any text where no font is given, is not drawn. Convert it to \
          paths in an editor."

@@ -59,7 +59,7 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 pub use diagnostics::{Code, Diagnostic, Severity};
-pub use drawing::{Drawing, Pen, Point, Span};
+pub use drawing::{Drawing, Pen, Point, Segment, Span};
 pub use source::looks_like_svg;
 
 /// How pens are numbered.
@@ -102,6 +102,34 @@ pub trait StrokeFont: Debug {
     fn glyph(&self, character: char) -> Option<StrokeGlyph>;
 }
 
+/// A character as closed outlines.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OutlineGlyph {
+    /// Distance from its origin to that of the next character, in font sizes.
+    pub advance: f64,
+    /// Connected pieces, each list from a point back to it, in font sizes; base line at 0, y up.
+    pub contours: Vec<Vec<Segment>>,
+}
+
+/// A face of a font, as CSS names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaceQuery<'a> {
+    /// Families as written, with commas between; may be empty.
+    pub families: &'a str,
+    /// Weight, 400 for normal and 700 for bold.
+    pub weight: u16,
+    /// Whether it is italic or oblique.
+    pub italic: bool,
+}
+
+/// Fonts whose outlines text is drawn with.
+pub trait OutlineFonts: Debug {
+    /// The family that stands for this face; `None` if there is none at all.
+    fn family(&self, query: FaceQuery<'_>) -> Option<String>;
+    /// The glyph of a character; `None` if the face lacks it.
+    fn glyph(&self, query: FaceQuery<'_>, character: char) -> Option<OutlineGlyph>;
+}
+
 /// How a file is read.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'a> {
@@ -115,6 +143,8 @@ pub struct Options<'a> {
     pub dpi: Option<f64>,
     /// The font that text is drawn in; without one, text is reported as missing.
     pub font: Option<&'a dyn StrokeFont>,
+    /// Fonts for text, where outlines are wanted; characters that they lack are drawn in `font`.
+    pub outlines: Option<&'a dyn OutlineFonts>,
 }
 
 /// What a file says about a pen.

@@ -29,7 +29,7 @@ pub(crate) const HATCH_CROSSINGS: u64 = 5_000_000;
 pub(crate) const CLIP_EDGES: u64 = 2_000_000;
 /// Pairs of pieces and clip edges looked at; a pair of curves that come close counts a thousand
 /// times.
-pub(crate) const CLIP_PAIRS: u64 = 1_000_000_000;
+pub(crate) const CLIP_PAIRS: u64 = 150_000_000;
 /// Largest distance from the page's origin, mm.
 pub(crate) const COORDINATE_MM: f64 = 25e6;
 /// Different findings kept.

@@ -66,6 +66,8 @@ pub(crate) struct Style<'a> {
     pub(crate) color: [u8; 3],
     pub(crate) font_size: f64,
     pub(crate) font_family: &'a str,
+    pub(crate) font_weight: u16,
+    pub(crate) italic: bool,
     pub(crate) anchor: Anchor,
     pub(crate) letter_spacing: f64,
     pub(crate) word_spacing: f64,
@@ -102,6 +104,8 @@ impl Default for Style<'_> {
             color: [0; 3],
             font_size: 16.0,
             font_family: "",
+            font_weight: 400,
+            italic: false,
             anchor: Anchor::Start,
             letter_spacing: 0.0,
             word_spacing: 0.0,
@@ -236,6 +240,34 @@ impl<'a> Style<'a> {
         };
         match name {
             "font-family" if value != "inherit" => self.font_family = value,
+            "font-weight" => {
+                self.font_weight = match value {
+                    "inherit" => parent.font_weight,
+                    "normal" => 400,
+                    "bold" => 700,
+                    "bolder" => {
+                        if parent.font_weight < 600 {
+                            700
+                        } else {
+                            900
+                        }
+                    }
+                    "lighter" => {
+                        if parent.font_weight < 600 {
+                            100
+                        } else {
+                            400
+                        }
+                    }
+                    number => number.parse().ok().filter(|weight| (1..=1000).contains(weight))?,
+                }
+            }
+            "font-style" => {
+                self.italic = match value {
+                    "inherit" => parent.italic,
+                    other => other.starts_with("italic") || other.starts_with("oblique"),
+                }
+            }
             "text-anchor" => {
                 self.anchor = match value {
                     "middle" => Anchor::Middle,

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use drawing::{Affine, Point, Vec2};
+use drawing::{Affine, FillRule, Point, Segment, Vec2};
 use svgtypes::LengthListParser;
 
 use crate::attributes;
@@ -13,9 +13,12 @@ use crate::shapes;
 use crate::style::Style;
 use crate::units::{self, Axis, Basis};
 use crate::walk::{Element, Scope, Walker};
+use crate::{FaceQuery, Options, OutlineGlyph};
 
 /// Height of capitals in font sizes, as common fonts have it.
 const CAP_HEIGHT_EM: f64 = 0.7;
+/// Width of the place of a character that no font has, font sizes.
+const MISSING_EM: f64 = 0.6;
 
 /// A character with what is given for it alone.
 #[derive(Debug)]
@@ -42,10 +45,58 @@ struct Letters<'a> {
     lists: Vec<Lists>,
 }
 
+/// A character in the font that it is drawn in.
+struct Glyph {
+    /// Distance to the next character, in font sizes.
+    advance_em: f64,
+    /// Height of capitals in units of a stroke font; `None` for outlines, whose unit is the font size.
+    cap_height: Option<f64>,
+    /// In units of the font, y up.
+    subpaths: Vec<Subpath>,
+}
+
+/// The face that a style asks for.
+fn face<'a>(style: &Style<'a>) -> FaceQuery<'a> {
+    FaceQuery { families: style.font_family, weight: style.font_weight, italic: style.italic }
+}
+
+/// A letter from the outline fonts, else from the stroke font; `None` if both lack it.
+fn glyph(options: &Options<'_>, letter: &Letter<'_>) -> Option<Glyph> {
+    let outline = options.outlines.and_then(|fonts| fonts.glyph(face(&letter.style), letter.character));
+    if let Some(OutlineGlyph { advance, contours }) = outline {
+        let contour = |segments: Vec<Segment>| {
+            let start = segments.first()?.start();
+            Some(Subpath { start, segments, closed: true })
+        };
+        let subpaths = contours.into_iter().filter_map(contour).collect();
+        return Some(Glyph { advance_em: advance, cap_height: None, subpaths });
+    }
+    let font = options.font?;
+    let cap_height = font.cap_height();
+    let glyph = font.glyph(letter.character)?;
+    let subpaths = glyph.strokes.iter().filter_map(|points| Subpath::polyline(points, false)).collect();
+    let advance_em = glyph.advance * (CAP_HEIGHT_EM / cap_height);
+    Some(Glyph { advance_em, cap_height: Some(cap_height), subpaths })
+}
+
+/// Distance from a letter to the next, user units.
+fn advance(options: &Options<'_>, letter: &Letter<'_>) -> f64 {
+    glyph(options, letter).map_or(MISSING_EM, |glyph| glyph.advance_em) * letter.style.font_size
+}
+
 /// Reports the font that the stroke font stands for; false where there is no font at all.
 fn report_font<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, style: &Style<'a>) -> bool {
     let family = style.font_family.split(',').next().unwrap_or("").trim().trim_matches(['"', '\'']);
     let family = if family.is_empty() { "default" } else { family };
+    if let Some(found) = walker.options.outlines.and_then(|fonts| fonts.family(face(style))) {
+        if !found.eq_ignore_ascii_case(family) {
+            walker.report(codes::TEXT_FONT, family, node, || {
+                let help = "name another font file, or install the font".into();
+                (format!("text in the font {family} is drawn with the outlines of {found}"), Some(help))
+            });
+        }
+        return true;
+    }
     if walker.options.font.is_none() {
         walker.note(codes::TEXT_NOT_DRAWN, "text", node, "text is not drawn: no font is given");
         return false;
@@ -149,8 +200,6 @@ impl<'a> Letters<'a> {
 
 /// Places characters and draws them: chunks between absolute positions are anchored as a whole.
 fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>, letters: &[Letter<'a>]) {
-    let Some(font) = walker.options.font else { return };
-    let em = CAP_HEIGHT_EM / font.cap_height();
     let mut at = Point::ZERO;
     let mut rest = letters;
     while !rest.is_empty() {
@@ -173,9 +222,8 @@ fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
         for letter in chunk {
             at += (letter.shift[0], letter.shift[1]);
             places.push(at);
-            let advance = font.glyph(letter.character).map_or(0.6 / em, |glyph| glyph.advance);
             let blank = if letter.character == ' ' { letter.style.word_spacing } else { 0.0 };
-            at.x += advance * em * letter.style.font_size + letter.style.letter_spacing + blank;
+            at.x += advance(walker.options, letter) + letter.style.letter_spacing + blank;
         }
         let back = first.style.anchor.share() * (at.x - origin.x);
         for (letter, place) in chunk.iter().zip(places) {
@@ -196,7 +244,6 @@ fn along_path<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<
     if !report_font(walker, node, &first.style) || walker.content_scope(scope, target).is_none() {
         return;
     }
-    let Some(font) = walker.options.font else { return };
     let basis = scope.basis();
     let shape = shapes::outline(attributes::name(target).unwrap_or(""), target, basis);
     let map = target.attribute("transform").and_then(attributes::transform).unwrap_or_default();
@@ -208,11 +255,8 @@ fn along_path<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<
         way.push((total, lengths));
         total += way.last().map_or(0.0, |(_, lengths)| lengths.total);
     }
-    let em = CAP_HEIGHT_EM / font.cap_height();
-    let advance = |letter: &Letter<'_>| {
-        let own = font.glyph(letter.character).map_or(0.6 / em, |glyph| glyph.advance);
-        own * em * letter.style.font_size
-    };
+    let options = *walker.options;
+    let advance = |letter: &Letter<'_>| advance(&options, letter);
     let spacing = |letter: &Letter<'_>| {
         letter.style.letter_spacing + if letter.character == ' ' { letter.style.word_spacing } else { 0.0 }
     };
@@ -250,30 +294,37 @@ fn draw_letter<'a>(
     if letter.character == ' ' || !style.visible {
         return;
     }
-    let Some(font) = walker.options.font else { return };
-    let Some(glyph) = font.glyph(letter.character) else {
+    let Some(glyph) = glyph(walker.options, letter) else {
         let character = letter.character;
         walker.report(codes::UNKNOWN_CHARACTER, &character.to_string(), node, || {
-            (format!("the stroke font has no character {character:?}"), None)
+            (format!("no font has the character {character:?}"), None)
         });
         return;
     };
+    let placed = |scale: f64| {
+        let raise = style.baseline_shift - style.baseline_em * style.font_size;
+        scope.map
+            * Affine::translate(place.to_vec2())
+            * attributes::rotation(letter.rotation_deg)
+            * Affine::translate((0.0, -raise))
+            * Affine::scale_non_uniform(scale, -scale)
+    };
+    let scale = glyph.cap_height.map_or(style.font_size, |cap| CAP_HEIGHT_EM * style.font_size / cap);
+    if let Some(sink) = &mut walker.sink {
+        sink.take(&glyph.subpaths, placed(scale));
+        return;
+    }
     let fill = walker.color_of(style.fill, style.fill_opacity, node, scope);
     let color = fill.or_else(|| walker.color_of(style.stroke, style.stroke_opacity, node, scope));
     let Some(color) = color else {
         walker.note(codes::NO_PAINT, "", node, "a shape has neither stroke nor fill and is not drawn");
         return;
     };
-    let scale = CAP_HEIGHT_EM * style.font_size / font.cap_height();
-    let raise = style.baseline_shift - style.baseline_em * style.font_size;
     let mut inner = scope.clone();
-    inner.map = scope.map
-        * Affine::translate(place.to_vec2())
-        * attributes::rotation(letter.rotation_deg)
-        * Affine::translate((0.0, -raise))
-        * Affine::scale_non_uniform(scale, -scale);
-    let strokes: Vec<Subpath> =
-        glyph.strokes.iter().filter_map(|points| Subpath::polyline(points, false)).collect();
+    inner.map = placed(scale);
+    if glyph.cap_height.is_none() && fill.is_some() {
+        walker.hatch(node, &inner, &glyph.subpaths, FillRule::NonZero, color);
+    }
     let ink = walker.ink(node, &inner, color);
-    walker.draw(node, &inner, &strokes, &ink);
+    walker.draw(node, &inner, &glyph.subpaths, &ink);
 }

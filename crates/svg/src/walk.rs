@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use drawing::{Affine, Drawing, Pen, Span};
+use drawing::{Affine, Drawing, Pen, Rect, Span};
 use roxmltree::Node;
 
 use crate::attributes::{self, INKSCAPE};
@@ -63,6 +63,28 @@ impl Scope<'_> {
     }
 }
 
+/// What takes shapes and letters that are measured instead of drawn. Nothing is reported then.
+#[derive(Debug)]
+pub(crate) enum Sink {
+    /// Their bounding box.
+    Bounds(Option<Rect>),
+    /// The outlines of letters.
+    Outlines(Vec<Subpath>),
+}
+
+impl Sink {
+    pub(crate) fn take(&mut self, subpaths: &[Subpath], map: Affine) {
+        let placed: Vec<Subpath> = subpaths.iter().map(|subpath| subpath.transformed(map)).collect();
+        match self {
+            Self::Bounds(bounds) => {
+                let both = bounds.iter().copied().chain(path::bounds(&placed));
+                *bounds = both.reduce(|one, other| one.union(other));
+            }
+            Self::Outlines(all) => all.extend(placed),
+        }
+    }
+}
+
 /// Goes through a document.
 #[derive(Debug)]
 pub(crate) struct Walker<'a, 'f> {
@@ -76,6 +98,8 @@ pub(crate) struct Walker<'a, 'f> {
     /// Whether the file has layers of Inkscape; otherwise groups at the top with an id are layers.
     has_layers: bool,
     stopped: bool,
+    /// Where shapes and letters go instead of being drawn, while something is measured.
+    pub(crate) sink: Option<Sink>,
     regions: BTreeMap<regions::Key, Rc<Region>>,
     /// Styles of elements that are drawn by reference, by the element.
     styles: BTreeMap<usize, Rc<Style<'a>>>,
@@ -90,7 +114,9 @@ impl<'a> Walker<'a, '_> {
         node: Element<'_>,
         message: impl FnOnce() -> (String, Option<String>),
     ) {
-        self.findings.report(code, subject, || attributes::place(node), message);
+        if self.sink.is_none() {
+            self.findings.report(code, subject, || attributes::place(node), message);
+        }
     }
 
     /// Reports a finding without help.
@@ -161,8 +187,15 @@ impl<'a> Walker<'a, '_> {
             }
             _ => {}
         }
-        let Some(inner) = self.enter(node, scope) else { return };
+        if let Some(inner) = self.enter(node, scope) {
+            self.content(name, node, inner);
+        }
+    }
+
+    /// Draws what an element holds, in its own scope.
+    fn content(&mut self, name: &'a str, node: Element<'a>, inner: Scope<'a>) {
         match name {
+            "g" | "a" if self.sink.is_some() => self.children(node, &inner),
             "g" | "a" => {
                 let Some(inner) = self.layer(node, inner) else { return };
                 self.children(node, &inner);
@@ -212,10 +245,24 @@ impl<'a> Walker<'a, '_> {
         inner.style = Rc::new(style);
         self.transform(node, &mut inner);
         let name = attributes::name(node).unwrap_or_default();
-        if !shapes::is_shape(name) {
-            self.clip(node, &mut inner, || None);
+        // Bounding boxes are those of the geometry, without clips.
+        if !shapes::is_shape(name) && self.sink.is_none() {
+            let bounds =
+                if self.is_clipped_by_bounds(node, &inner) { self.bounds(name, node, &inner) } else { None };
+            self.clip(node, &mut inner, || bounds);
         }
         Some(inner)
+    }
+
+    /// The bounding box of what an element holds, in its user units.
+    fn bounds(&mut self, name: &'a str, node: Element<'a>, scope: &Scope<'a>) -> Option<Rect> {
+        let inner = Scope { map: Affine::IDENTITY, clips: Rc::default(), ..scope.clone() };
+        self.sink = Some(Sink::Bounds(None));
+        self.content(name, node, inner);
+        match self.sink.take() {
+            Some(Sink::Bounds(bounds)) => bounds,
+            _ => None,
+        }
     }
 
     /// The style of an element below one of style `parent`.
@@ -292,6 +339,10 @@ impl<'a> Walker<'a, '_> {
             });
         }
         if shape.subpaths.is_empty() {
+            return;
+        }
+        if let Some(sink) = &mut self.sink {
+            sink.take(&shape.subpaths, scope.map);
             return;
         }
         self.clip(node, &mut scope, || path::bounds(&shape.subpaths));

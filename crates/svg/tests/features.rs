@@ -1,7 +1,10 @@
 //! One test per feature of SVG, on small files of our own.
 
 use drawing::{Segment, Stroke};
-use svg::{Document, Options, Pen, Pens, Point, Severity, StrokeFont, StrokeGlyph};
+use svg::{
+    Document, FaceQuery, Options, OutlineFonts, OutlineGlyph, Pen, Pens, Point, Severity, StrokeFont,
+    StrokeGlyph,
+};
 
 /// A page of 100 mm with user units of 1 mm; strokes are black, fills none.
 fn page(content: &str) -> String {
@@ -246,6 +249,26 @@ fn clip_paths_nest_and_follow_bounding_boxes() {
 }
 
 #[test]
+fn clip_paths_in_the_bounding_box_of_a_group() {
+    let clip =
+        "<clipPath id='c' clipPathUnits='objectBoundingBox'><rect x='.25' width='.5' height='1'/></clipPath>";
+    // The group's box goes from 10, 0 to 50, 10; nested transforms count, its own transform does not.
+    let content = format!(
+        "{clip}<g clip-path='url(#c)' transform='translate(0 20)'><path d='M10 0H50'/>\
+         <g transform='scale(2)'><path d='M5 5H25'/></g></g>"
+    );
+    assert_eq!(lines(&content), [[20.0, 20.0, 40.0, 20.0], [20.0, 30.0, 40.0, 30.0]]);
+    // A group that is clipped so within another one, and by `use`.
+    let content = format!(
+        "{clip}<g clip-path='url(#c)'><path d='M0 40V60'/><g id='i' clip-path='url(#c)'><path d='M0 50H80V52'/></g></g>"
+    );
+    assert_eq!(lines(&content), [[20.0, 50.0, 60.0, 50.0]]);
+    let content =
+        format!("{clip}<defs><path id='p' d='M0 0H80V2'/></defs><use href='#p' y='7' clip-path='url(#c)'/>");
+    assert_eq!(lines(&content), [[20.0, 7.0, 60.0, 7.0]]);
+}
+
+#[test]
 fn ink_on_the_clip_outline_stays() {
     let content = "<clipPath id='c'><rect x='10' y='10' width='20' height='20'/></clipPath>\
         <rect clip-path='url(#c)' x='10' y='10' width='20' height='20'/>";
@@ -405,6 +428,66 @@ fn tspans_place_and_blanks_collapse() {
     );
     let starts: Vec<[f64; 2]> = found.iter().map(|line| [line[0], line[1]]).collect();
     assert_eq!(starts, [[10.0, 20.0], [24.0, 20.0], [30.0, 25.0]]);
+}
+
+/// Every letter is a square of half the font size on the base line; only the family "Known" exists.
+#[derive(Debug)]
+struct Squares;
+
+impl OutlineFonts for Squares {
+    fn family(&self, _query: FaceQuery<'_>) -> Option<String> {
+        Some("Known".into())
+    }
+
+    fn glyph(&self, query: FaceQuery<'_>, character: char) -> Option<OutlineGlyph> {
+        let side = if query.weight >= 700 { 1.0 } else { 0.5 };
+        let corners = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0)].map(Point::from);
+        let line = |pair: &[Point]| Segment::Line(drawing::Line::new(pair[0], pair[1]));
+        let square = corners.windows(2).map(line).collect();
+        (character != 'x').then(|| OutlineGlyph {
+            advance: 1.0,
+            contours: if character == ' ' { Vec::new() } else { vec![square] },
+        })
+    }
+}
+
+#[test]
+fn text_as_outlines() {
+    let read = |content: &str, hatch: Option<svg::Hatch>| {
+        let options = Options { outlines: Some(&Squares), hatch, ..Options::default() };
+        svg::read(page(content).as_bytes(), &options)
+    };
+    let text = "<text x='10' y='50' font-size='20' fill='#00f' font-family='Known'>ab<tspan font-weight='bold'>c</tspan></text>";
+    let document = read(text, None);
+    let boxes: Vec<[f64; 4]> = document
+        .drawing
+        .strokes
+        .iter()
+        .map(|stroke| {
+            let bounds = stroke.bounding_box();
+            [bounds.x0, 100.0 - bounds.y1, bounds.x1, 100.0 - bounds.y0].map(|mm| (mm * 1e9).round() / 1e9)
+        })
+        .collect();
+    assert_eq!(boxes, [[10.0, 40.0, 20.0, 50.0], [30.0, 40.0, 40.0, 50.0], [50.0, 30.0, 70.0, 50.0]]);
+    assert!(document.drawing.strokes.iter().all(Stroke::is_closed));
+    assert_eq!(document.diagnostics, []);
+    // Fills are hatched, other families and missing characters reported.
+    let hatched = read(text, Some(svg::Hatch { spacing_mm: 1.0, angle_rad: 0.0 }));
+    assert!((hatched.drawing.length() - document.drawing.length() - 600.0).abs() < 31.0);
+    assert_eq!(
+        codes(&read("<text font-family='Other' fill='red'>ax</text>", None)),
+        [("S0208", 1), ("S0209", 1)]
+    );
+    // As a clip path.
+    let clip = "<clipPath id='c'><text x='10' y='50' font-size='20'>a b</text></clipPath><path clip-path='url(#c)' d='M0 45H100'/>";
+    let clipped = read(clip, None);
+    let ends: Vec<[f64; 2]> = clipped
+        .drawing
+        .strokes
+        .iter()
+        .map(|s| [s.start().x, s.end().x].map(|mm| (mm * 1e9).round() / 1e9))
+        .collect();
+    assert_eq!(ends, [[10.0, 20.0], [50.0, 60.0]]);
 }
 
 #[test]

@@ -15,7 +15,8 @@ use std::fmt::Write as _;
 use sha2::Digest as _;
 
 pub use self::document::{Diagnostic, Document, Fact, Page, PenSettings, Severity};
-pub use self::svg::{Hatch, PenRule, SvgOptions};
+pub use self::svg::{Fonts, Hatch, PenRule, SvgOptions};
+pub use ::svg::{FaceQuery, OutlineFonts, OutlineGlyph};
 
 /// What a reader needs to know besides the bytes.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -30,6 +31,10 @@ pub struct Options {
     /// How an SVG file is read.
     #[serde(skip_serializing_if = "is_default")]
     pub svg: SvgOptions,
+    /// Fonts for the text of SVG files; the stroke font if `None`. A plan made with fonts depends on
+    /// them.
+    #[serde(skip)]
+    pub fonts: Option<Fonts>,
 }
 
 /// Whether the options for SVG are those that apply without being asked for.
@@ -111,6 +116,9 @@ pub fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     if importer.name != hpgl::IMPORTER.name && options.skip_white_pens {
         return Err(ImportError::NoEffect { options: "--white-pens is", format: importer.name });
     }
+    if importer.name != svg::IMPORTER.name && options.fonts.is_some() {
+        return Err(ImportError::NoEffect { options: "--text outlines is", format: importer.name });
+    }
     (importer.read)(bytes, options)
 }
 
@@ -128,6 +136,7 @@ impl Options {
         let mut options = self.clone();
         if format != svg::IMPORTER.name && formats.contains(&svg::IMPORTER.name) {
             options.svg = SvgOptions::default();
+            options.fonts = None;
         }
         if format != hpgl::IMPORTER.name && formats.contains(&hpgl::IMPORTER.name) {
             options.plotter = None;

@@ -1,5 +1,7 @@
 //! SVG, plain or gzipped.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 use svg::{StrokeFont, StrokeGlyph};
 
@@ -19,6 +21,16 @@ pub struct SvgOptions {
     pub outline_fills: bool,
     /// Pixels per inch; as the file's program has it if `None`.
     pub dpi: Option<f64>,
+}
+
+/// Fonts whose outlines text is drawn with. Two are equal if they are the same object.
+#[derive(Clone, Debug)]
+pub struct Fonts(pub Arc<dyn svg::OutlineFonts + Send + Sync>);
+
+impl PartialEq for Fonts {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 /// How pens are numbered.
@@ -68,6 +80,7 @@ fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
             outline_fills: wanted.outline_fills,
             dpi: wanted.dpi,
             font: Some(&LabelFont),
+            outlines: options.fonts.as_ref().map(|fonts| &*fonts.0 as &dyn svg::OutlineFonts),
         },
     );
     let [width, height] = document.page_mm;

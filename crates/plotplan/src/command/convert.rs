@@ -200,7 +200,7 @@ fn plan(
     }
     let reading = &arguments.reading;
     let (layout, command_line) = of_part(job, part);
-    let settings = Settings::of(&request, part.page, &reading.options(), &layout, command_line);
+    let settings = Settings::of(&request, part.page, &reading.options(None), &layout, command_line);
     let rows = || compiled.trajectory.rows().map(|row| row.row);
     output::write(to, |out| {
         let written = match format {

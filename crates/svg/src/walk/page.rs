@@ -58,6 +58,7 @@ pub(crate) fn read(tree: &Document<'_>, options: &Options<'_>, findings: &mut Fi
         bytes_left: limits::ATTRIBUTE_BYTES,
         has_layers,
         stopped: false,
+        sink: None,
         regions: BTreeMap::new(),
         styles: BTreeMap::new(),
     };

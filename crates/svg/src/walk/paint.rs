@@ -2,6 +2,8 @@
 
 use std::rc::Rc;
 
+use drawing::FillRule;
+
 use super::{Element, Scope, Walker};
 use crate::attributes;
 use crate::codes;
@@ -53,14 +55,7 @@ impl<'a> Walker<'a, '_> {
         color: [u8; 3],
         is_stroked: bool,
     ) {
-        if let Some(hatch) = self.options.hatch.filter(|hatch| hatch.spacing_mm > 0.0) {
-            let outlines: Vec<Subpath> =
-                shape.subpaths.iter().map(|subpath| subpath.transformed(scope.map)).collect();
-            let ink = self.ink(node, scope, color);
-            if let Err(refused) = self.output.hatch(&outlines, scope.style.fill_rule, hatch, &ink) {
-                self.refused(node, refused);
-            }
-        }
+        self.hatch(node, scope, &shape.subpaths, scope.style.fill_rule, color);
         if self.options.outline_fills && !is_stroked {
             let ink = self.ink(node, scope, color);
             self.draw(node, scope, &shape.subpaths, &ink);
@@ -72,6 +67,23 @@ impl<'a> Walker<'a, '_> {
                 let help = "hatch fills, draw their outlines, or give the shape a stroke".into();
                 ("a shape has a fill and no stroke: it is not drawn".into(), Some(help))
             });
+        }
+    }
+
+    /// Hatches the inside of subpaths, if fills are hatched at all.
+    pub(crate) fn hatch(
+        &mut self,
+        node: Element<'a>,
+        scope: &Scope<'a>,
+        subpaths: &[Subpath],
+        rule: FillRule,
+        color: [u8; 3],
+    ) {
+        let Some(hatch) = self.options.hatch.filter(|hatch| hatch.spacing_mm > 0.0) else { return };
+        let outlines: Vec<Subpath> = subpaths.iter().map(|subpath| subpath.transformed(scope.map)).collect();
+        let ink = self.ink(node, scope, color);
+        if let Err(refused) = self.output.hatch(&outlines, rule, hatch, &ink) {
+            self.refused(node, refused);
         }
     }
 

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use drawing::{Affine, Point, Rect};
 use roxmltree::Node;
 
-use super::{Element, Scope, Walker};
+use super::{Element, Scope, Sink, Walker};
 use crate::attributes;
 use crate::clip::{Area, Region};
 use crate::codes;
@@ -39,6 +39,31 @@ impl<'a> Walker<'a, '_> {
         }
     }
 
+    /// Whether the element has a clip path in units of its bounding box.
+    pub(super) fn is_clipped_by_bounds(&mut self, node: Element<'a>, scope: &Scope<'a>) -> bool {
+        let Some(id) = scope.style.clip_path else { return false };
+        self.clip_path(node, id, scope).is_some_and(in_bounding_box)
+    }
+
+    /// The outlines of a text's letters, mm.
+    fn text_outlines(&mut self, node: Element<'a>, scope: &Scope<'a>) -> Vec<Subpath> {
+        let style = self.style(node, &scope.style, scope.basis());
+        if !style.displayed || !self.may_enter(node, scope) {
+            return Vec::new();
+        }
+        let mut inner = scope.clone();
+        inner.depth += 1;
+        inner.style = Rc::new(style);
+        self.transform(node, &mut inner);
+        // The region of a text's clip path may be asked for while something is measured.
+        let outer = self.sink.replace(Sink::Outlines(Vec::new()));
+        crate::text::draw(self, node, &inner);
+        match std::mem::replace(&mut self.sink, outer) {
+            Some(Sink::Outlines(outlines)) => outlines,
+            _ => Vec::new(),
+        }
+    }
+
     /// Clips a scope to a rectangle in user units.
     pub(crate) fn clip_to(&mut self, scope: &mut Scope<'a>, rect: Rect) {
         let corners = [(rect.x0, rect.y0), (rect.x1, rect.y0), (rect.x1, rect.y1), (rect.x0, rect.y1)];
@@ -65,7 +90,7 @@ impl<'a> Walker<'a, '_> {
     ) -> Option<Rc<Region>> {
         let frame = if in_bounding_box(clip_path) {
             let Some(bounds) = bounds else {
-                let message = "a clip path in units of a group's bounding box is not applied";
+                let message = "a clip path in units of the bounding box of nothing is not applied";
                 self.note(codes::CLIP_NOT_APPLIED, "", node, message);
                 return None;
             };
@@ -94,8 +119,18 @@ impl<'a> Walker<'a, '_> {
         }
         for child in clip_path.children().filter(Node::is_element) {
             if attributes::name(child) == Some("text") {
-                self.note(codes::CLIP_NOT_APPLIED, "text", node, "a clip path made of text is not applied");
-                return None;
+                if self.options.outlines.is_none() {
+                    self.report(codes::CLIP_NOT_APPLIED, "text", node, || {
+                        let help = "draw text as outlines, or convert it to paths in an editor".into();
+                        ("a clip path made of text is not applied".into(), Some(help))
+                    });
+                    return None;
+                }
+                let outlines = self.text_outlines(child, &inner);
+                let edges = outlines.iter().map(|outline| outline.segments.len() as u64).sum();
+                self.output.clip_edges_left = self.output.clip_edges_left.saturating_sub(edges);
+                region.areas.extend(Area::new(&outlines, drawing::FillRule::NonZero));
+                continue;
             }
             region.areas.extend(self.area(child, &inner));
         }
