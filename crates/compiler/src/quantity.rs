@@ -13,10 +13,19 @@ pub struct Quantity {
 
 /// What was written is not a quantity of the wanted kind.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not {wanted}")]
 pub struct QuantityError {
     text: String,
     wanted: String,
+}
+
+impl std::fmt::Display for QuantityError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { text, wanted } = self;
+        if text.trim().parse::<f64>().is_ok() {
+            return write!(f, "`{text}` has no unit: it is not {wanted}");
+        }
+        write!(f, "`{text}` is not {wanted}")
+    }
 }
 
 /// Units of length with their size in mm.

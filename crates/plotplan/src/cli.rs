@@ -391,7 +391,7 @@ pub(crate) struct Planning {
     #[arg(long)]
     pub(crate) keep_direction: bool,
     /// Order of the pens; those not named come after, in the file's order
-    #[arg(long, value_name = "PEN,PEN,...", value_delimiter = ',')]
+    #[arg(long, value_name = "PEN,PEN,...", value_delimiter = ',', value_parser = pen)]
     pub(crate) pen_order: Option<Vec<u16>>,
     /// Source of the drawing speed
     #[arg(long, value_enum, default_value_t = Speed::Machine)]
@@ -437,7 +437,7 @@ pub(crate) struct Placement {
     #[arg(long, value_enum)]
     pub(crate) mirror: Option<Mirror>,
     /// Distance that --fit, --shrink and --align keep from the edges of the sheet
-    #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = length)]
+    #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = length, allow_hyphen_values = true)]
     pub(crate) margin: f64,
 }
 
@@ -925,6 +925,11 @@ fn page(text: &str) -> Result<PageChoice, String> {
             .map(PageChoice::Number)
             .map_err(|_| "expected the number of a page, or `all`".to_owned()),
     }
+}
+
+fn pen(text: &str) -> Result<u16, String> {
+    let pen = text.trim().parse::<u16>().ok();
+    pen.ok_or_else(|| "expected numbers of pens with commas between, such as 2,1".to_owned())
 }
 
 fn pen_pair(text: &str) -> Result<(u16, u16), String> {

@@ -44,11 +44,20 @@ pub(crate) fn write(
         use std::os::unix::fs::PermissionsExt as _;
         temporary.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    // Only the kind of error: its text would name the temporary file.
-    let file = temporary.tempfile_in(folder).map_err(|error| failed(error.kind().into()))?;
+    let file = temporary.tempfile_in(folder).map_err(|error| failed(without_path(error)))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
     let file = out.into_inner().map_err(|error| failed(error.into_error()))?;
     file.persist(path).map_err(|error| failed(error.error))?;
     Ok(())
+}
+
+/// The system's own error: the text around it names the temporary file.
+fn without_path(error: std::io::Error) -> std::io::Error {
+    use std::error::Error as _;
+    let inner = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
+    match error.raw_os_error().or_else(|| inner.and_then(std::io::Error::raw_os_error)) {
+        Some(code) => std::io::Error::from_raw_os_error(code),
+        None => error.kind().into(),
+    }
 }

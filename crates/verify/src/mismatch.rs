@@ -76,6 +76,9 @@ pub fn mismatches(machine: &Machine, header: &Header) -> Vec<Mismatch> {
                 (plan, machine) => plan == machine,
             };
             if !equal {
+                // Beyond a thousandth of a tick digits say nothing.
+                let [plan, machine] =
+                    [plan, machine].map(|limit| limit.map(|limit| (limit * 1e3).round() / 1e3));
                 found.push(Mismatch::Limit { motor: motor.name.clone(), quantity, unit, plan, machine });
             }
         }

@@ -66,7 +66,7 @@ impl SyntaxError {
     /// map, `toml` points at the head of the table.
     pub(super) fn of(toml: &str, error: &toml::de::Error) -> Self {
         let start = error.span().map_or(0, |span| span.start.min(toml.len()));
-        let (message, help, word) = explain(error.message());
+        let (message, help, word) = explain(error.message(), key_at(toml, start));
         let at = word.and_then(|word| position_of(toml, start, &word)).unwrap_or(start);
         // A key missing from the file as a whole has no line.
         let line = (at > 0 || !message.ends_with("is missing")).then(|| {
@@ -78,7 +78,7 @@ impl SyntaxError {
 }
 
 /// Message, help, and the key or value that the message is about.
-fn explain(message: &str) -> (String, Option<String>, Option<String>) {
+fn explain(message: &str, key: &str) -> (String, Option<String>, Option<String>) {
     let quoted =
         |text: &str| -> Vec<String> { text.split('`').skip(1).step_by(2).map(ToOwned::to_owned).collect() };
     for (prefix, what) in [("unknown field ", "key"), ("unknown variant ", "value")] {
@@ -102,10 +102,34 @@ fn explain(message: &str) -> (String, Option<String>, Option<String>) {
         .find_map(|prefix| message.strip_prefix(prefix));
     if let Some(rest) = number.filter(|rest| rest.ends_with("expected a string")) {
         let value = quoted(rest).into_iter().next().unwrap_or_default();
-        let help = format!("write the number with its unit as text, such as \"{value}mm\"");
+        let help = format!("write the number with its unit as text, such as \"{value}{}\"", unit_of(key));
         return (format!("{value} has no unit"), Some(help), None);
     }
+    if key == "matrix" {
+        let help = "write the entries as numbers, such as [[1, 0], [0.5, 0.5]]".to_owned();
+        return (message.to_owned(), Some(help), None);
+    }
     (message.to_owned(), None, None)
+}
+
+/// The key of the line at a position.
+fn key_at(toml: &str, at: usize) -> &str {
+    let line_start = toml[..at].rfind('\n').map_or(0, |end| end + 1);
+    let line = toml[line_start..].lines().next().unwrap_or_default();
+    line.split_once('=').map_or("", |(key, _)| key.trim())
+}
+
+/// A unit that a key takes, as an example.
+fn unit_of(key: &str) -> &'static str {
+    match key {
+        "counts" => "/rev",
+        "max_speed" | "max_travel_speed" => "mm/s",
+        "max_acceleration" => "mm/s2",
+        "max_jerk" => "mm/s3",
+        "lift_time" | "drop_time" | "period" => "ms",
+        "theta" | "psi" | "phi" => "deg",
+        _ => "mm",
+    }
 }
 
 /// Where `word = ...` or `... = "word"` stands at or after `start`.
