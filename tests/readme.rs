@@ -76,7 +76,7 @@ fn readme_commands_print_the_shown_output() {
             pictures += 1;
         }
     }
-    assert_eq!(pictures, 1);
+    assert_eq!(pictures, 2);
 }
 
 #[test]

@@ -54,7 +54,7 @@ const STEPS: &[Step] = &[
 const PROPTEST_SEED: &str = "20261122";
 
 /// Fuzz targets (`fuzz/fuzz_targets`), seconds for each.
-const FUZZ_TARGETS: &[&str] = &["read", "emit", "svg"];
+const FUZZ_TARGETS: &[&str] = &["read", "emit", "svg", "recognize"];
 const FUZZ_SECONDS: u32 = 30;
 
 /// Runs the named steps, or the default ones, up to the first failure; prints the time of each.
@@ -196,10 +196,10 @@ fn fuzz() -> Result<()> {
     for target in FUZZ_TARGETS {
         let seeds = crate::top().join("fuzz/corpus").join(target);
         std::fs::create_dir_all(&seeds).with_context(|| format!("{}", seeds.display()))?;
-        let (folders, extensions, dictionary): (&[_], &[_], _) = if *target == "svg" {
-            (&["examples"], &["svg"], "svg.dict")
-        } else {
-            (&["examples", "tests/drawings"], &["hpgl", "pcl"], "hpgl.dict")
+        let (folders, extensions, dictionary): (&[_], &[_], _) = match *target {
+            "svg" => (&["examples"], &["svg"], "svg.dict"),
+            "recognize" => (&["examples", "tests/drawings"], &["hpgl", "pcl", "svg"], "svg.dict"),
+            _ => (&["examples", "tests/drawings"], &["hpgl", "pcl"], "hpgl.dict"),
         };
         for folder in folders {
             copy_drawings(&crate::top().join(folder), &seeds, extensions)?;

@@ -9,6 +9,7 @@ mod ci;
 mod corpus;
 mod order;
 mod peers;
+mod svg_peers;
 mod tidy;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
@@ -19,6 +20,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
                 without a certificate
   peers [DIR …] compare the interpretation of our drawings, and those below DIR, with hp2xx
                 (skipped if it is not installed): length and distance
+  usvg DIR      compare the SVG importer with usvg on every SVG file in DIR: length and distance
   order DIR     plan every drawing below DIR in file order and in optimized order, on two machines
   bench order GENERATOR
                 order the drawings of the script GENERATOR (python3 with numpy); compare with
@@ -39,6 +41,7 @@ fn main() -> ExitCode {
         ["corpus", folder] => corpus::run(folder.as_ref()),
         ["bench", "order", generator] => order::bench(generator.as_ref()),
         ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),
+        ["usvg", folder] => svg_peers::run(folder.as_ref()),
         ["order", folder] => order::real(folder.as_ref()),
         ["bench", "read"] => bench::read(None),
         ["bench", "read", generator] => bench::read(Some(generator.as_ref())),

@@ -221,7 +221,7 @@ fn polylines(text: &str) -> Polylines {
     lines
 }
 
-fn length(lines: &[Vec<Point>]) -> f64 {
+pub(crate) fn length(lines: &[Vec<Point>]) -> f64 {
     lines.iter().flat_map(|line| line.windows(2)).map(|pair| (pair[1] - pair[0]).hypot()).sum()
 }
 
@@ -249,11 +249,11 @@ fn pieces(lines: &[Vec<Point>]) -> impl Iterator<Item = (Point, Point)> + '_ {
     ends.filter(|(a, b)| (*b - *a).hypot() > CHORD_MM)
 }
 
-fn index(lines: &[Vec<Point>]) -> RTree<Line<[f64; 2]>> {
+pub(crate) fn index(lines: &[Vec<Point>]) -> RTree<Line<[f64; 2]>> {
     RTree::bulk_load(pieces(lines).map(|(a, b)| Line::new([a.x, a.y], [b.x, b.y])).collect())
 }
 
-fn farthest(lines: &[Vec<Point>], to: &RTree<Line<[f64; 2]>>) -> Option<f64> {
+pub(crate) fn farthest(lines: &[Vec<Point>], to: &RTree<Line<[f64; 2]>>) -> Option<f64> {
     let step = (length(lines) / MOST_SAMPLES).max(FINEST_STEP_MM);
     if !step.is_finite() {
         return None;
