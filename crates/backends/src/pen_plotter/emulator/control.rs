@@ -40,6 +40,7 @@ const ENQ: u8 = 0x05;
 
 /// The receiver's state.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the machine")]
 pub(super) struct Control {
     parsing: Parsing,
     /// Off: everything but ESC.( is passed on to the terminal.
@@ -87,11 +88,10 @@ impl Control {
             _ if byte == ESC => self.parsing = Parsing::Escape,
             Parsing::Text if self.is_off => {}
             Parsing::Text if byte == ENQ => return Received::Enquiry,
-            Parsing::Text => return Received::Text(byte),
             Parsing::Escape if byte == b'.' => self.parsing = Parsing::Dot,
             // Not device control: the text of HP-GL, without the ESC.
             Parsing::Escape if self.is_off => {}
-            Parsing::Escape => return Received::Text(byte),
+            Parsing::Text | Parsing::Escape => return Received::Text(byte),
             Parsing::Dot => return self.letter(byte),
             Parsing::Parameters(letter, text) if byte == b':' => self.parameters(letter, &text),
             Parsing::Parameters(letter, mut text) => {
@@ -122,7 +122,7 @@ impl Control {
             b'O' => return Received::Status,
             b'R' => {
                 let (error, is_off) = (self.error, self.is_off);
-                *self = Self { error, is_off, ..Self::default() };
+                *self = Self { is_off, error, ..Self::default() };
             }
             _ => self.error(11),
         }

@@ -52,6 +52,7 @@ enum Parsing {
 
 /// State of the interpreter. Positions are in plotter units, in the frame that `RO` has chosen.
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the machine")]
 pub(super) struct Interpreter {
     plotter: &'static Plotter,
     parsing: Parsing,
@@ -574,6 +575,13 @@ impl Interpreter {
         }
     }
 
+    /// The position in user units.
+    fn user(&self) -> [f64; 2] {
+        let [sx, sy] = self.scale_factors();
+        let [x1, _, y1, _] = self.scale.unwrap_or_default();
+        [x1 + (self.at[0] - self.points[0]) / sx, y1 + (self.at[1] - self.points[1]) / sy]
+    }
+
     /// The answer of `O` and this letter.
     fn output(&mut self, letter: u8) -> Step {
         let rounded = |values: &[f64]| {
@@ -583,7 +591,10 @@ impl Interpreter {
         let [x, y] = self.at;
         let down = f64::from(u8::from(self.down));
         Step::answering(match letter {
-            b'A' | b'C' => rounded(&[x, y, down]),
+            b'C' if self.scale.is_some() => {
+                let [x, y] = self.user();
+                format!("{x:.4},{y:.4},{down}")
+            }
             b'E' => std::mem::take(&mut self.error).to_string(),
             b'F' => "40,40".to_owned(),
             b'H' => {

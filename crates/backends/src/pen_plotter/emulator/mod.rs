@@ -70,15 +70,15 @@ impl Emulator {
                 self.port.push(byte);
             }
             Received::Nothing => {}
-            Received::Room => self.answer(self.port.room().to_string(), now_us),
+            Received::Room => self.answer(&self.port.room().to_string(), now_us),
             Received::Size => self.control.wants_size = true,
             Received::Status => {
                 let status = self.status();
-                self.answer(status.to_string(), now_us);
+                self.answer(&status.to_string(), now_us);
             }
             Received::LineError => {
                 let error = self.control.take_error();
-                self.answer(error.to_string(), now_us);
+                self.answer(&error.to_string(), now_us);
             }
             Received::DropAnswers => self.outbox.clear(),
             Received::DropBuffer => {
@@ -106,7 +106,7 @@ impl Emulator {
     }
 
     /// An answer with what `ESC.M` puts around it.
-    fn answer(&mut self, text: String, now_us: u64) {
+    fn answer(&mut self, text: &str, now_us: u64) {
         if !self.outbox.is_empty() && self.outbox.iter().any(|(at, _)| *at > now_us) {
             // The answer before it is not out yet.
             self.control.error(10);
@@ -135,7 +135,7 @@ impl Emulator {
         }
         if self.control.wants_size && self.port.buffer.is_empty() {
             self.control.wants_size = false;
-            self.answer(BUFFER_BYTES.to_string(), now_us);
+            self.answer(&BUFFER_BYTES.to_string(), now_us);
         }
     }
 
@@ -144,7 +144,7 @@ impl Emulator {
         while self.busy_us <= now_us && !self.view && self.port.stalled_us <= now_us {
             let Some(step) = self.interpreter.step(&mut self.port.buffer, &mut self.port.ink) else { break };
             if let Some(answer) = step.answer {
-                self.answer(answer, now_us);
+                self.answer(&answer, now_us);
             }
             self.busy_us = now_us + step.duration_us;
             self.moved_us = self.busy_us;

@@ -236,3 +236,10 @@ fn power_cut_forgets_everything_but_the_place() {
     assert_eq!(bench.ask("OA;OS;"), "700,600,0\r24\r");
     assert_eq!(bench.lines().len(), 1);
 }
+
+#[test]
+fn commanded_position_is_in_user_units() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask("PU700,800;OC;"), "700,800,0\r");
+    assert_eq!(bench.ask("IP0,0,1000,2000;SC0,10,0,10;PU5,2.5;OC;OA;"), "5.0000,2.5000,0\r500,500,0\r");
+}

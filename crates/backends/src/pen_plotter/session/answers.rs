@@ -3,7 +3,7 @@
 use super::super::check;
 use super::super::plotter::Plotter;
 use super::super::query::{Asked, Query, instruction_error, line_error};
-use super::super::state::{PenState, mnemonic, numbers};
+use super::super::state::{mnemonic, numbers};
 use super::{INITIALIZED, LEVER, OPENING, POLL_US, PlotterSession, RECOVERY, Stage, VIEW};
 use crate::session::{Outcome, Progress, Session as _};
 
