@@ -241,3 +241,28 @@ fn pen_positions_of_a_z_axis_have_fractions() {
     assert!(gcode.contains("Z-0.5") && gcode.contains("Z5\n"), "{gcode}");
     assert!(fail(&dir, command, 2).contains("a servo takes whole numbers"));
 }
+
+#[test]
+fn info_of_a_gcode_file_of_ours() {
+    let dir = TestDir::new();
+    dir.write("a.hpgl", "IN;SP1;PU400,400;PD1200,400;PU;SP2;PU2000,2000;CI400;PU;");
+    let command = "convert a.hpgl -m cartesian -o a.gcode --format";
+    for format in ["gcode-grbl", "gcode-marlin", "gcode-klipper"] {
+        succeed(&dir, &format!("{command} {format}"));
+        let report = succeed(&dir, "info a.gcode --report json").stdout;
+        let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+        let program = &report["program_file"];
+        let number = |key: &str| program[key].as_f64().expect("a number");
+        let ink = 20.0 + 20.0 * std::f64::consts::PI;
+        assert!((number("ink_mm") - ink).abs() < 0.1, "{format}: {program}");
+        let bounds: Vec<f64> =
+            program["bounds_mm"].as_array().expect("bounds").iter().filter_map(|n| n.as_f64()).collect();
+        let near =
+            bounds.iter().zip([10.0, 10.0, 60.0, 60.0]).all(|(found, right)| (found - right).abs() < 0.1);
+        assert!(near, "{format}: {bounds:?}");
+        assert_eq!(program["pauses"], 2, "{format}: the first pen and the second");
+        assert!(number("drawing_s") > 0.3 && number("drawing_s") < 5.0, "{format}: {program}");
+    }
+    let text = String::from_utf8(succeed(&dir, "info a.gcode").stdout).expect("text");
+    assert!(text.contains("(G-code)") && text.contains("pen 2"), "{text}");
+}

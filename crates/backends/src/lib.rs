@@ -10,7 +10,7 @@ mod device;
 mod ebb;
 mod error;
 mod fault_injection;
-mod gcode;
+pub mod gcode;
 mod halstreamer;
 mod ink;
 mod joint_trajectory;

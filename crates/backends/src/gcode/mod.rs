@@ -5,6 +5,7 @@ mod emulator;
 mod encode;
 mod program;
 mod status;
+mod summary;
 
 use std::io::Write;
 
@@ -19,6 +20,7 @@ use crate::transmission::character_counting::CharacterCounting;
 use crate::{Line, WriteError};
 
 pub(crate) use encode::Flavour;
+pub use summary::{GcodeSummary, is_ours, summary};
 
 /// Chords of curves that G-code cannot express deviate by no more than this, mm.
 const CHORD_MM: f64 = 0.01;

@@ -109,6 +109,40 @@ impl PenReport {
     }
 }
 
+/// A G-code program that was read.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ProgramReport {
+    /// Lines that are no comments.
+    pub lines: usize,
+    /// Length of lines and arcs (`G1`, `G2`, `G3`), mm.
+    pub ink_mm: f64,
+    /// Length of travel (`G0`), mm.
+    pub travel_mm: f64,
+    /// Time of lines and arcs at their feeds, s; the firmware's accelerations add to it.
+    pub drawing_s: f64,
+    /// Time of dwells, s.
+    pub dwell_s: f64,
+    /// Extent of lines and arcs: left, bottom, right, top; mm. `null` without any.
+    pub bounds_mm: Option<[f64; 4]>,
+    /// Number of pauses for a pen.
+    pub pauses: usize,
+}
+
+impl ProgramReport {
+    /// Rounds the numbers.
+    #[must_use]
+    pub fn rounded(self) -> Self {
+        Self {
+            ink_mm: round::mm(self.ink_mm),
+            travel_mm: round::mm(self.travel_mm),
+            drawing_s: round::s(self.drawing_s),
+            dwell_s: round::s(self.dwell_s),
+            bounds_mm: self.bounds_mm.map(|bounds| bounds.map(round::mm)),
+            ..self
+        }
+    }
+}
+
 /// A plan that was read.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PlanReport {

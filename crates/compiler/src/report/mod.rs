@@ -18,7 +18,9 @@ use serde::Serialize;
 pub use self::certificate::{
     CertificateReport, DeviationReport, Distances, JerkReport, MotorReport, TickFloor,
 };
-pub use self::input::{DrawingReport, FactReport, MotorLimits, PageReport, PenReport, PlanReport};
+pub use self::input::{
+    DrawingReport, FactReport, MotorLimits, PageReport, PenReport, PlanReport, ProgramReport,
+};
 pub use self::machine::{ListedMachine, MachineMotor, MachineReport, MachineSource, SheetReport};
 pub use self::sending::{SendEnd, SendReport};
 pub use self::summary::{Ordering, Summary};
@@ -51,6 +53,8 @@ pub struct Report {
     pub drawing: Option<DrawingReport>,
     /// A plan that was read, from `info`.
     pub plan: Option<PlanReport>,
+    /// A G-code program that plotplan wrote, from `info`.
+    pub program_file: Option<ProgramReport>,
     /// The files that were written, from `convert`, in the order of their names.
     pub outputs: Vec<OutputReport>,
     /// The plan that was computed, from `convert` with one output, and from `info` with a machine.

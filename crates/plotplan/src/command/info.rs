@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use backends::gcode;
 use compiler::import::{Diagnostic, Fact};
 use compiler::replay;
 use compiler::report::text::{self, duration, length, pluralize};
-use compiler::report::{CertificateReport, DrawingReport, PlanReport, Summary};
+use compiler::report::{CertificateReport, DrawingReport, PlanReport, ProgramReport, Summary};
+use drawing::Rect;
 use kinematics::Machine;
 
 use crate::cli::Info;
@@ -21,6 +23,9 @@ const TOLERANCE_MM: f64 = 1.0;
 pub(crate) fn run(arguments: &Info) -> Result<(), Failure> {
     let inputs = Inputs::read(std::slice::from_ref(&arguments.file))?;
     let input = inputs.first();
+    if let Some(text) = std::str::from_utf8(&input.bytes).ok().filter(|text| gcode::is_ours(text)) {
+        return output::report(&of_program(input, text));
+    }
     if plan::file::is_plan(&input.bytes) {
         output::report(&of_plan(input, arguments.machine.as_deref())?)
     } else {
@@ -126,6 +131,40 @@ fn findings(diagnostics: &[Diagnostic]) -> String {
         format!("{:<8} {count} x {code} {}\n", diagnostic.severity.to_string(), diagnostic.title)
     };
     kinds.iter().map(line).collect()
+}
+
+/// A G-code program of ours.
+fn of_program(input: &Input, program: &str) -> String {
+    let found = gcode::summary(program);
+    let mut text = format!("program  {} (G-code)\n", input.path);
+    let _ = writeln!(text, "lines    {}", found.lines);
+    let _ = writeln!(
+        text,
+        "time     {} at the feeds of the file, and dwells of {}; accelerations and travel add to it",
+        duration(found.drawing_s),
+        duration(found.dwell_s)
+    );
+    let _ = writeln!(text, "ink      {}", length(found.drawn_mm));
+    let _ = writeln!(text, "travel   {}", length(found.travel_mm));
+    if let Some(bounds) = found.bounds {
+        let (width, height) = (bounds.width(), bounds.height());
+        let Rect { x0, y0, x1, y1 } = bounds;
+        let _ = writeln!(text, "bounds   {x0:.2}, {y0:.2} to {x1:.2}, {y1:.2} mm ({width:.2} x {height:.2})");
+    }
+    for pause in &found.pauses {
+        let _ = writeln!(text, "pause    {pause}");
+    }
+    let report = ProgramReport {
+        lines: found.lines,
+        ink_mm: found.drawn_mm,
+        travel_mm: found.travel_mm,
+        drawing_s: found.drawing_s,
+        dwell_s: found.dwell_s,
+        bounds_mm: found.bounds.map(|bounds| [bounds.x0, bounds.y0, bounds.x1, bounds.y1]),
+        pauses: found.pauses.len(),
+    };
+    session::report(|all| all.program_file = Some(report.rounded()));
+    text
 }
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
