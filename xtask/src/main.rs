@@ -28,6 +28,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bench read [GENERATOR]
                 bytes to drawing: throughput, scaling and memory, compared with hp2xx; inputs from
                 the script GENERATOR (python3) or built in
+  bench simulate
+      speed of simulations and of a search of gains
   bench plan [PYTHON]
                 the planner's workload: duration, limits and throughput, compared with toppra if
                 PYTHON (python3) has it
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         ["bench", "read"] => bench::read(None),
         ["bench", "read", generator] => bench::read(Some(generator.as_ref())),
         ["bench", "read-once", file] => bench::read_once(file.as_ref()),
+        ["bench", "simulate"] => bench::simulate(),
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),
         _ => {

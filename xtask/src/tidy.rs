@@ -63,6 +63,7 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("serialport", &["plotplan"]),
     ("indicatif", &["plotplan"]),
     ("toml", &["backends", "compiler", "xtask"]),
+    ("toml_edit", &["compiler"]),
     ("serde", &["backends", "compiler", "plan", "plotplan"]),
     ("serde_json", &["backends", "compiler", "plan", "plotplan", "xtask"]),
 ];

@@ -48,3 +48,5 @@ mod restart;
 mod same_ink;
 pub mod scene;
 pub mod settings;
+pub mod simulate;
+pub mod tune;

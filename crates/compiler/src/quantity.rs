@@ -186,6 +186,49 @@ pub fn rate_ticks(
     size.map(|size| quantity.value * size * counts_per_unit.abs()).ok_or_else(wrong)
 }
 
+/// Quantities of motors and masses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhysicalUnit {
+    /// V
+    Voltage,
+    /// A
+    Current,
+    /// ohm
+    Resistance,
+    /// N m
+    Torque,
+    /// N m/A, equal to V s/rad
+    TorqueConstant,
+    /// kg m²
+    Inertia,
+    /// kg
+    Mass,
+}
+
+impl PhysicalUnit {
+    /// What it is called, and its units with their size in SI units.
+    fn units(self) -> (&'static str, &'static [(&'static str, f64)]) {
+        match self {
+            Self::Voltage => ("a voltage", &[("V", 1.0), ("mV", 1e-3)]),
+            Self::Current => ("a current", &[("A", 1.0), ("mA", 1e-3)]),
+            Self::Resistance => ("a resistance", &[("ohm", 1.0), ("mohm", 1e-3)]),
+            Self::Torque => ("a torque", &[("Nm", 1.0), ("mNm", 1e-3), ("Ncm", 1e-2)]),
+            Self::TorqueConstant => ("a torque constant", &[("Nm/A", 1.0), ("mNm/A", 1e-3), ("Vs/rad", 1.0)]),
+            Self::Inertia => ("a moment of inertia", &[("kgm2", 1.0), ("gcm2", 1e-7)]),
+            Self::Mass => ("a mass", &[("kg", 1.0), ("g", 1e-3)]),
+        }
+    }
+
+    /// The value in SI units.
+    ///
+    /// # Errors
+    /// When the text is something else.
+    pub fn value(self, text: &str) -> Result<f64, QuantityError> {
+        let (kind, units) = self.units();
+        text.parse::<Quantity>()?.in_units(text, units, kind)
+    }
+}
+
 /// A speed of the pen in mm/s.
 ///
 /// # Errors
@@ -225,6 +268,14 @@ mod tests {
         assert!(counts("80").is_err());
         assert!(counts("80/s").is_err());
         assert!(counts("80/0mm").is_err());
+    }
+
+    #[test]
+    fn physical_quantities_take_units() {
+        assert_eq!(PhysicalUnit::Voltage.value("12V"), Ok(12.0));
+        assert_eq!(PhysicalUnit::Current.value("300 mA"), Ok(0.3));
+        assert_eq!(PhysicalUnit::Inertia.value("54gcm2"), Ok(54e-7));
+        assert!(PhysicalUnit::Mass.value("12V").is_err());
     }
 
     #[test]

@@ -35,6 +35,7 @@ pub fn of_plan(title: &str, rows: &[Row], machine: &Machine, colors: PenColors) 
         title: title.to_owned(),
         sheet: machine.sheet(),
         reach: reach_outlines(machine),
+        reference: Vec::new(),
         ink: ink
             .into_iter()
             .map(|Polyline { pen, points }| Ink { pen, line: InkLine::Points(points) })
@@ -54,6 +55,22 @@ pub fn of_machine(machine: &Machine) -> Scene {
         reach: reach_outlines(machine),
         shades: tick_floor(machine),
         ink: Vec::new(),
+        reference: Vec::new(),
+        colors: PenColors::new(),
+        travel: Vec::new(),
+        start: Some(start_point(machine)),
+    }
+}
+
+/// Predicted ink over the drawing that it should be, both in machine mm.
+pub fn of_ink(title: &str, lines: Vec<(u16, Vec<Point>)>, drawing: &Drawing, machine: &Machine) -> Scene {
+    Scene {
+        title: title.to_owned(),
+        sheet: machine.sheet(),
+        reach: reach_outlines(machine),
+        shades: None,
+        reference: drawing.strokes.iter().map(|stroke| stroke.flatten(CHORD_MM)).collect(),
+        ink: lines.into_iter().map(|(pen, points)| Ink { pen, line: InkLine::Points(points) }).collect(),
         colors: PenColors::new(),
         travel: Vec::new(),
         start: Some(start_point(machine)),
@@ -119,6 +136,7 @@ fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, st
         sheet,
         reach,
         shades: None,
+        reference: Vec::new(),
         ink,
         colors: PenColors::new(),
         travel,

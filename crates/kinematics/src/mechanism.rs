@@ -125,6 +125,11 @@ pub trait Mechanism: Debug + Send + Sync {
     /// a path are proportional to the joints'.
     fn is_linear(&self) -> bool;
 
+    /// The mechanism as a two-link arm, if it is one: its links have masses in simulations.
+    fn as_two_link(&self) -> Option<&TwoLink> {
+        None
+    }
+
     /// Where a joint may have an extreme value while the pen follows a straight line, as parameters of
     /// the line; values outside (0, 1) and points out of reach are ignored. The line's ends and the
     /// foot of the perpendicular from [`Self::base`] need not be among them. Between neighbours of all

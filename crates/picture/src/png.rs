@@ -7,8 +7,8 @@ use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, 
 
 use crate::palette::{Colour, colour_on_white};
 use crate::scene::{
-    DASH_MM, INK_MM, InkLine, OUTLINE_MM, REACH_FILL, REACH_LINE, SHEET_LINE, START, Scene, TRAVEL,
-    TRAVEL_MM, shade,
+    DASH_MM, INK_MM, InkLine, OUTLINE_MM, REACH_FILL, REACH_LINE, REFERENCE, REFERENCE_MM, SHEET_LINE, START,
+    Scene, TRAVEL, TRAVEL_MM, shade,
 };
 
 /// A picture's longer side has at most this many pixels, lest it need gigabytes.
@@ -55,6 +55,9 @@ pub fn encode(scene: &Scene, longer_px: u32) -> Result<Vec<u8>, PngError> {
     canvas.line(&corners.map(Point::from), true, SHEET_LINE, OUTLINE_MM, None);
     for travel in &scene.travel {
         canvas.line(travel, false, TRAVEL, TRAVEL_MM, Some(DASH_MM));
+    }
+    for line in &scene.reference {
+        canvas.line(line, false, REFERENCE, REFERENCE_MM, None);
     }
     for pen in scene.pens() {
         for ink in scene.ink.iter().filter(|ink| ink.pen == pen) {

@@ -12,12 +12,14 @@ pub(crate) const REACH_FILL: Colour = [0xEE, 0xF3, 0xF8];
 pub(crate) const REACH_LINE: Colour = [0xA9, 0xB9, 0xC9];
 pub(crate) const SHEET_LINE: Colour = [0x55, 0x55, 0x55];
 pub(crate) const TRAVEL: Colour = [0x8C, 0x8C, 0x8C];
+pub(crate) const REFERENCE: Colour = [0x9C, 0xC8, 0xF0];
 pub(crate) const START: Colour = [0xB0, 0x00, 0x20];
 /// Shades from the smallest to the largest value: light to dark orange.
 const SHADES: [Colour; 2] = [[0xFF, 0xF4, 0xE0], [0xC8, 0x64, 0x00]];
 
 /// Widths and lengths in mm, for a page of any size: ink is as wide as a pen's, the rest is thinner.
 pub(crate) const INK_MM: f64 = 0.3;
+pub(crate) const REFERENCE_MM: f64 = 0.8;
 pub(crate) const OUTLINE_MM: f64 = 0.25;
 pub(crate) const TRAVEL_MM: f64 = 0.12;
 pub(crate) const DASH_MM: f64 = 1.0;
@@ -33,6 +35,8 @@ pub struct Scene {
     pub reach: Vec<Vec<Point>>,
     /// A quantity over the workspace, below everything else.
     pub shades: Option<Shades>,
+    /// What the ink should be, for comparison: drawn wider and lighter below the ink.
+    pub reference: Vec<Vec<Point>>,
     /// What is drawn, in its order.
     pub ink: Vec<Ink>,
     /// The pens' own colours.
@@ -105,7 +109,7 @@ impl Scene {
                 vec![Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)]
             }
         });
-        let others = self.travel.iter().flatten().chain(&self.start).copied();
+        let others = self.travel.iter().chain(&self.reference).flatten().chain(&self.start).copied();
         let points = ink.chain(others).filter(|point| point.is_finite());
         let bounds = points.fold(self.sheet.abs(), |bounds, point| bounds.union_pt(point));
         let cells = self.shades.iter().flat_map(|shades| &shades.cells);
@@ -152,6 +156,14 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
         polyline(&mut text, travel)?;
     }
     text.str("\"/>\n");
+    if !scene.reference.is_empty() {
+        text.str("<path id=\"reference\" stroke=\"").str(&hex(REFERENCE)).str("\" stroke-width=\"");
+        text.fixed(REFERENCE_MM).str("\" d=\"");
+        for line in &scene.reference {
+            polyline(&mut text, line)?;
+        }
+        text.str("\"/>\n");
+    }
     for pen in scene.pens() {
         text.str("<g id=\"pen").int(pen).str("\" stroke=\"").str(&hex(colour_on_white(pen, &scene.colors)));
         text.str("\" stroke-width=\"").fixed(INK_MM).str("\">\n");

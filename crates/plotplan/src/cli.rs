@@ -78,6 +78,10 @@ pub(crate) enum Command {
     Verify(Verify),
     /// Draw a picture of a drawing or a plan on its machine
     Preview(Preview),
+    /// Predict what a machine's motors and feedback loop draw
+    Simulate(Simulate),
+    /// Find the gains of a machine's feedback loop, or its motor's parameters from a recorded step
+    Tune(Tune),
     /// Send a plan to a machine
     Send(Send),
     /// Emulate a controller on a pseudo-terminal
@@ -523,6 +527,82 @@ pub(crate) enum PictureFormat {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Simulate {
+    /// Plan or drawing; `-` for standard input
+    #[arg(required_unless_present = "step")]
+    pub(crate) file: Option<String>,
+    /// Machine with a [drive] table; for a plan document only to take another drive
+    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    pub(crate) machine: Option<String>,
+    /// For a plan: the drawing that the ink is compared with, instead of the plan's own ink
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) drawing: Vec<String>,
+    /// Exit with 1 when ink strays or is missed by more than this
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub(crate) within: Option<f64>,
+    /// Write the predicted ink over the drawing (NAME.svg, NAME.png), or the motion every 2 ms (NAME.csv); with --step its
+    /// response (NAME.svg, NAME.csv)
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: Option<String>,
+    /// Setpoints, instead of those of the drive
+    #[arg(long, value_enum)]
+    pub(crate) setpoints: Option<Setpoints>,
+    /// Simulate a step of the setpoint by this many ticks, instead of a plan
+    #[arg(long, value_name = "TICKS", allow_negative_numbers = true, value_parser = ticks)]
+    pub(crate) step: Option<f64>,
+    /// With --step: the motor [default: the first]
+    #[arg(long, value_name = "NAME", requires = "step")]
+    pub(crate) motor: Option<String>,
+    /// With --step: simulated time
+    #[arg(long, value_name = "TIME", default_value = "3s", value_parser = time, requires = "step")]
+    pub(crate) duration: f64,
+    /// How to report on standard output
+    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
+    pub(crate) report: ReportForm,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
+    #[command(flatten)]
+    pub(crate) planning: Planning,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Tune {
+    /// Machine with a [drive] table
+    #[arg(short, long, value_name = "NAME|FILE.toml", required_unless_present = "from_step")]
+    pub(crate) machine: Option<String>,
+    /// Drawing whose ink error is to be least [default: a test pattern of lines, corners and a circle]
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) drawing: Vec<String>,
+    /// Identify a motor from a record of a step response instead: rows of time in s, position in ticks, duty in percent
+    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["machine", "drawing", "output", "loop_period"])]
+    pub(crate) from_step: Option<String>,
+    /// Period of the feedback loop, instead of the machine's
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub(crate) loop_period: Option<f64>,
+    /// Write the machine file with the new gains, its comments kept
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub(crate) output: Option<String>,
+    /// How to report on standard output
+    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
+    pub(crate) report: ReportForm,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
+    #[command(flatten)]
+    pub(crate) planning: Planning,
+}
+
+/// How a plan becomes setpoints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Setpoints {
+    /// The vertices of the drawing, each when the last one is reached
+    Vertices,
+    /// Each row until the next one
+    Held,
+    /// Linear interpolation between rows
+    Interpolated,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Send {
     /// Plan to send, or for gcode, xy-serial, hpgl and raw a file in the machine's own language; `-` for standard input
     pub(crate) plan: String,
@@ -958,6 +1038,11 @@ fn crop(text: &str) -> Result<Crop, String> {
         return Err("the width and height of the window must be positive".to_owned());
     }
     Ok(Crop::Window(window))
+}
+
+fn ticks(text: &str) -> Result<f64, String> {
+    let ticks = text.trim().parse::<f64>().ok().filter(|ticks| ticks.abs() >= 1.0 && ticks.abs() <= 1e9);
+    ticks.ok_or_else(|| "expected a number of ticks from 1 to 1e9, such as 3200".to_owned())
 }
 
 fn dpi(text: &str) -> Result<f64, String> {

@@ -8,6 +8,8 @@ mod info;
 mod machine;
 mod preview;
 mod send;
+mod simulate;
+mod tune;
 mod verify;
 
 use backends::pen_plotter::plotter;
@@ -31,6 +33,8 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Info(info) => info::run(info),
         Command::Verify(verify) => verify::run(verify),
         Command::Preview(preview) => preview::run(preview),
+        Command::Simulate(simulate) => simulate::run(simulate),
+        Command::Tune(tune) => tune::run(tune),
         Command::Send(send) => send::run(send),
         #[cfg(unix)]
         Command::Emulate(emulate) => emulate::run(emulate),

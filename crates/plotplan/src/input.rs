@@ -95,6 +95,11 @@ impl Inputs {
         files.iter().map(|file| read(file)).collect::<Result<_, _>>().map(Self)
     }
 
+    /// One file.
+    pub(crate) fn of(input: Input) -> Self {
+        Self(vec![input])
+    }
+
     /// The first file.
     pub(crate) fn first(&self) -> &Input {
         &self.0[0]

@@ -59,6 +59,8 @@ pub(crate) fn without_effect(matches: &ArgMatches) -> Option<String> {
         "convert" => convert(&options),
         "preview" => preview(&options),
         "check" | "info" => drawing(&options),
+        "simulate" => simulate(&options),
+        "tune" => tune(&options),
         "verify" if !options.has("drawing") => options.refuse(&READING, "without --drawing"),
         _ => None,
     };
@@ -150,6 +152,33 @@ fn planning(options: &Given<'_>) -> Option<String> {
             options.refuse(&ORDERING, "with --order file").filter(|_| options.text("order") == "file")
         })
         .or_else(|| margin(options))
+}
+
+fn simulate(options: &Given<'_>) -> Option<String> {
+    if options.has("step") {
+        let why = "with --step";
+        return options
+            .refuse(&["drawing", "within", "setpoints"], why)
+            .or_else(|| options.refuse(&PLANNING, why))
+            .or_else(|| options.refuse(&PLACEMENT, why))
+            .or_else(|| options.refuse(&READING, why));
+    }
+    planning(options)
+}
+
+fn tune(options: &Given<'_>) -> Option<String> {
+    let why = if options.has("from_step") {
+        "with --from-step"
+    } else if options.has("drawing") {
+        return planning(options);
+    } else {
+        "without --drawing"
+    };
+    options.refuse(&PLANNING, why).or_else(|| options.refuse(&PLACEMENT, why)).or_else(|| {
+        // The paper is the sheet of the test pattern.
+        let reading: Vec<&str> = READING.into_iter().filter(|id| *id != "paper").collect();
+        options.refuse(&reading, why)
+    })
 }
 
 /// `--margin` is for placements that look at the sheet's edges.
@@ -282,6 +311,11 @@ mod tests {
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "-mcorexy"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "--paper", "a4"]);
+        row(&["plotplan", "simulate", "x.hpgl", "-mcoaxial"]);
+        row(&["plotplan", "simulate", "-mcoaxial", "--step", "3200"]);
+        row(&["plotplan", "tune", "-mcoaxial"]);
+        row(&["plotplan", "tune", "-mcoaxial", "-dx.hpgl"]);
+        row(&["plotplan", "tune", "--from-step", "x.csv"]);
         row(&["plotplan", "verify", "x.csv"]);
         row(&["plotplan", "verify", "x.csv", "-dx.hpgl"]);
         insta::assert_snapshot!(table);

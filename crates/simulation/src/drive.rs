@@ -139,6 +139,7 @@ impl Drive {
                     within(key, gain, 0.0, 1e9, "")?;
                 }
                 within("drive.cascade.speed_window", gains.speed_window_s, 0.0, LONGEST_S, "s")?;
+                within("drive.cascade.current_filter", gains.current_filter_s, 0.0, LONGEST_S, "s")?;
             }
         }
         for motor in &self.motors {

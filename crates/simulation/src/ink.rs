@@ -20,6 +20,8 @@ const MISSED_STEP_MM: f64 = 0.1;
 const CORNER_RAD: f64 = std::f64::consts::FRAC_PI_4;
 /// Overshoot belongs to a corner for this time after the plan has passed it, us.
 const CORNER_US: u64 = 300_000;
+/// Points of a line of ink are at least this far apart, mm.
+const LINE_STEP_MM: f64 = 0.02;
 /// Shorter tails do not show, mm.
 const TAIL_MM: f64 = 0.05;
 
@@ -254,12 +256,21 @@ impl<'a> InkRecorder<'a> {
         }
     }
 
-    /// The lines of ink with their pens, machine mm.
+    /// The lines of ink with their pens, machine mm; points nearer than 0.02 mm to the last one are
+    /// left out.
     pub fn lines(&self) -> Vec<(u16, Vec<Point>)> {
-        self.dabs
-            .chunk_by(|a, b| a.line == b.line)
-            .map(|line| (line[0].pen, line.iter().map(|dab| dab.at).collect()))
-            .collect()
+        let line = |dabs: &[Dab]| {
+            let mut points = vec![dabs[0].at];
+            let mut last = dabs[0].at;
+            for dab in &dabs[1..] {
+                if distance(last, dab.at) > LINE_STEP_MM {
+                    last = dab.at;
+                    points.push(last);
+                }
+            }
+            (dabs[0].pen, points)
+        };
+        self.dabs.chunk_by(|a, b| a.line == b.line).map(line).collect()
     }
 
     /// The root mean square of stray and missed distances together, from every `thin`-th sample and

@@ -24,15 +24,18 @@
 
 pub mod controller;
 mod drive;
+mod identify;
 mod ink;
 mod margins;
 pub mod plant;
 mod run;
 mod setpoint;
 mod step_response;
+pub mod tune;
 
 pub use controller::{AntiWindup, CascadeGains, FeedForward, MotorModel, PidGains};
 pub use drive::{Drive, DriveError, Feedback, MotorDrive, MotorPlant};
+pub use identify::{Estimate, Identified, IdentifyError, Recorded, identify};
 pub use ink::{Distances, InkError, InkRecorder, Tails, Target, Worst};
 pub use margins::{Margins, margins};
 pub use plant::{

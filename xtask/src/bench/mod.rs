@@ -3,6 +3,7 @@
 mod inputs;
 mod plan;
 mod read;
+mod simulate;
 mod workload;
 
 use std::ffi::OsStr;
@@ -20,6 +21,14 @@ pub(crate) fn plan(python: &str) -> Result<bool> {
         return released(&["plan".as_ref(), python.as_ref()]);
     }
     plan::run(python)
+}
+
+/// `bench simulate`; true if all goals were met.
+pub(crate) fn simulate() -> Result<bool> {
+    if cfg!(debug_assertions) {
+        return released(&["simulate".as_ref()]);
+    }
+    simulate::run()
 }
 
 /// `bench read`; true if all goals were met.

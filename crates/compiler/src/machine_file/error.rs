@@ -29,6 +29,9 @@ pub enum MachineFileError {
     /// The parts do not make a machine.
     #[error(transparent)]
     Machine(#[from] MachineError),
+    /// A value of the drive that cannot be.
+    #[error(transparent)]
+    Drive(#[from] simulation::DriveError),
     /// The file contradicts itself.
     #[error("{0}")]
     Invalid(String),

@@ -3,6 +3,8 @@
 //! The form is documented in docs/machine-files.md. Values carry their units as text and keep it, so that a file that was
 //! read can be written into a plan document and read back without a digit's change.
 
+mod drive;
+mod edit;
 mod error;
 
 use std::collections::BTreeMap;
@@ -12,7 +14,10 @@ use drawing::Rect;
 use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
 use kinematics::{JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits};
 use serde::{Deserialize, Serialize};
+use simulation::Drive;
 
+pub use self::drive::DriveTable;
+pub use self::edit::{drive_keys, with_drive};
 pub use self::error::{MachineFileError, SyntaxError};
 use crate::quantity::{self, Dimension, QuantityError};
 
@@ -72,6 +77,8 @@ pub struct MachineFile {
     start: PerJoint<String>,
     #[serde(default)]
     plan: PlanTable,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drive: Option<DriveTable>,
 }
 
 /// The `[geometry]` table: the kind of mechanism and its parameters.
@@ -232,7 +239,7 @@ impl MachineFile {
         let (x, y) = (length(&self.sheet.x, "sheet.x")?, length(&self.sheet.y, "sheet.y")?);
         let (width, height) =
             (length(&self.sheet.width, "sheet.width")?, length(&self.sheet.height, "sheet.height")?);
-        Ok(Machine::new(MachineParts {
+        let machine = Machine::new(MachineParts {
             name: self.name.clone(),
             joints,
             min_manipulability: match self.geometry.table.get(MIN_MANIPULABILITY) {
@@ -255,7 +262,19 @@ impl MachineFile {
             sheet: Rect { x0: x, y0: y, x1: x + width, y1: y + height },
             start,
             period_s: time(&self.plan.period, "plan.period")?,
-        })?)
+        })?;
+        // A drive that cannot be shows as soon as the machine is used.
+        self.drive(&machine)?;
+        Ok(machine)
+    }
+
+    /// The drive of the machine, for simulations; `None` for a file without `[drive]`.
+    ///
+    /// # Errors
+    /// When a value is not of the unit that its key wants, or cannot be; the error names the key.
+    pub fn drive(&self, machine: &Machine) -> Result<Option<Drive>, MachineFileError> {
+        let (Some(table), [first, second]) = (&self.drive, self.motor.as_slice()) else { return Ok(None) };
+        table.drive(machine, [first, second]).map(Some)
     }
 }
 

@@ -10,7 +10,9 @@ pub mod page;
 mod round;
 mod sending;
 mod summary;
+pub mod simulation;
 pub mod text;
+pub mod tuning;
 
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -152,6 +152,10 @@ impl Mechanism for TwoLink {
         false
     }
 
+    fn as_two_link(&self) -> Option<&TwoLink> {
+        Some(self)
+    }
+
     /// theta' = 0 where the second link is perpendicular to the line, psi' = 0 where the first is (see
     /// the derivatives above). With n the line's normal at distance d from the base: in the first case
     /// the elbow is at the distance d -+ L2 along n and on the circle about the base; in the second it

@@ -22,6 +22,8 @@ pub struct CascadeGains {
     pub current_ki: f64,
     /// Time over which the speed is measured, s.
     pub speed_window_s: f64,
+    /// Time constant of winding and low-pass filter between duty and measured current, s; 0 for none.
+    pub current_filter_s: f64,
 }
 
 /// A cascade of position, speed and current.
@@ -34,6 +36,7 @@ pub struct Cascade {
     calls: u32,
     window_start: Option<f64>,
     speed: f64,
+    current_a: f64,
     speed_sum: f64,
     current_sum: f64,
     saturated: bool,
@@ -49,6 +52,7 @@ impl Cascade {
             calls: 0,
             window_start: None,
             speed: 0.0,
+            current_a: 0.0,
             speed_sum: 0.0,
             current_sum: 0.0,
             saturated: false,
@@ -70,9 +74,11 @@ impl Controller for Cascade {
     fn update(&mut self, setpoint: &Setpoint, measured: &Measurement) -> f64 {
         self.measure_speed(measured.position);
         let gains = self.gains;
+        let share = -libm::expm1(-self.period_s / gains.current_filter_s.max(f64::MIN_POSITIVE));
+        self.current_a += share * (measured.current_a - self.current_a);
         let speed_error = gains.position_per_s * (setpoint.position - measured.position) - self.speed;
         let speed_sum = self.speed_sum + speed_error * self.period_s;
-        let current_error = gains.speed_kp * speed_error + gains.speed_ki * speed_sum - measured.current_a;
+        let current_error = gains.speed_kp * speed_error + gains.speed_ki * speed_sum - self.current_a;
         let current_sum = self.current_sum + current_error * self.period_s;
         let wanted = gains.current_kp * current_error + gains.current_ki * current_sum;
         self.saturated = wanted.abs() >= FULL_DUTY_PERCENT;
@@ -104,6 +110,7 @@ mod tests {
             current_kp: 100.0,
             current_ki: 100.0,
             speed_window_s: 0.01,
+            current_filter_s: 0.0,
         }
     }
 
