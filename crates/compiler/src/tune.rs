@@ -1,6 +1,7 @@
 //! What each measure on a drive buys, and the gains to use.
 
 use kinematics::{Machine, MachineError, MachineParts};
+use schemars::JsonSchema;
 use serde::Serialize;
 use simulation::tune::{OffCase, Terms, Tuned, Tuner, three_digits};
 use simulation::{
@@ -19,7 +20,7 @@ const SHORTEST_PERIOD_S: f64 = 1e-3;
 pub const TEST_PATTERN: &[u8] = b"IN;SP1;PU0,0;PD4000,0,4000,4000,0,4000,0,0;PU500,500;PD3500,3500;PU500,3500;PD3500,500;PU3000,2000;PA2000,2000;CI1000;PU600,2000;PD800,2300,1000,1700,1200,2300,1400,1700;PU0,0;SP0;";
 
 /// One row of the table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Measure {
     /// What is changed.
     pub name: &'static str,

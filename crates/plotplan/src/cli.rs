@@ -556,9 +556,6 @@ pub(crate) struct Simulate {
     /// With --step: simulated time
     #[arg(long, value_name = "TIME", default_value = "3s", value_parser = time, requires = "step")]
     pub(crate) duration: f64,
-    /// How to report on standard output
-    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
-    pub(crate) report: ReportForm,
     #[command(flatten)]
     pub(crate) reading: Reading,
     #[command(flatten)]
@@ -582,9 +579,6 @@ pub(crate) struct Tune {
     /// Write the machine file with the new gains, its comments kept
     #[arg(short, long, value_name = "FILE.toml")]
     pub(crate) output: Option<String>,
-    /// How to report on standard output
-    #[arg(long, value_enum, default_value_t = ReportForm::Text)]
-    pub(crate) report: ReportForm,
     #[command(flatten)]
     pub(crate) reading: Reading,
     #[command(flatten)]
@@ -938,13 +932,15 @@ impl Command {
             Self::Schema(_) => "schema",
             Self::Completions(_) => "completions",
             Self::Man(_) => "man",
+            Self::Simulate(_) => "simulate",
+            Self::Tune(_) => "tune",
         }
     }
 }
 
 /// Whether standard output holds the report itself, so that its JSON form goes there.
 pub(crate) fn reports_on_stdout(command: &str) -> bool {
-    ["check", "info", "verify", "machine check", "machine list"].contains(&command)
+    ["check", "info", "verify", "simulate", "tune", "machine check", "machine list"].contains(&command)
 }
 
 fn align(text: &str) -> Result<(f64, f64), String> {

@@ -9,8 +9,8 @@ mod machine;
 pub mod page;
 mod round;
 mod sending;
-mod summary;
 pub mod simulation;
+mod summary;
 pub mod text;
 pub mod tuning;
 
@@ -70,6 +70,16 @@ pub struct Report {
     pub machine: Option<MachineReport>,
     /// The machines that can be named, from `machine list`.
     pub machines: Option<Vec<ListedMachine>>,
+    /// Predicted ink compared with the drawing, from `simulate`.
+    pub ink: Option<simulation::InkReport>,
+    /// What motors and loop did, from `simulate`.
+    pub simulation: Option<simulation::SimulationReport>,
+    /// The response to a step, from `simulate --step`.
+    pub step: Option<simulation::StepReport>,
+    /// Gains and what each measure buys, from `tune`.
+    pub tuning: Option<tuning::TuningReport>,
+    /// The parameters of a motor, from `tune --from-step`.
+    pub motor: Option<tuning::MotorEstimates>,
     /// What was sent, from `send`.
     pub sending: Option<SendReport>,
 }
@@ -303,6 +313,7 @@ codes! {
     LostBytes "lost-bytes" 0 "The emulated controller lost bytes because its buffer was full."
     PenMissing "pen-missing" 0 "No stroke has a pen that an option names."
     PenColors "pen-colors" 0 "Several drawings give a pen different colours."
+    UnstableLoop "unstable-loop" 0 "The feedback loop of a motor is unstable."
     Foreign "foreign" 1 "The input is no drawing that is read, or not a drawing at all."
     NotAPlan "not-a-plan" 1 "The input is no plan, or a plan that is damaged or truncated."
     NoInk "no-ink" 1 "The drawing has no ink."
@@ -312,6 +323,8 @@ codes! {
     Format "format" 1 "The output format or the machine cannot represent the plan."
     OverLimit "over-limit" 1 "The plan exceeds the limits of the motors."
     Verification "verification" 1 "The certificate does not hold."
+    InkError "ink-error" 1 "Predicted ink strays or is missed by more than --within allows."
+    Undetermined "undetermined" 1 "A record does not determine all parameters of a motor."
     Strict "strict" 1 "There was a warning, and --strict was given."
     Drawing "drawing" 1 "The drawing or plan cannot be used for another reason, which the message states."
     Usage "usage" 2 "The command line is wrong."

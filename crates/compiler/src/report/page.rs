@@ -22,8 +22,8 @@ pub fn markdown() -> String {
          meaning or unit raises `schema_version`; new keys may appear at any time.\n\n\
          The object is the last line of standard error for commands whose result goes to standard output or\n\
          to a file (`convert`, `preview`, `send`, `emulate`, `machine show`), and the only line of standard\n\
-         output for commands whose result is the report itself (`check`, `info`, `verify`, `machine check`,\n\
-         `machine list`). All keys are always there; a part that a command does not report is `null`. A\n\
+         output for commands whose result is the report itself (`check`, `info`, `verify`, `simulate`, `tune`,\n\
+         `machine check`, `machine list`). All keys are always there; a part that a command does not report is `null`. A\n\
          number is rounded to what it means: lengths to 0.0001 mm, times to 1 us, shares to 0.0001, ticks to\n\
          0.001. A share is a fraction of a limit, 1 is the limit itself.\n\n"
     );

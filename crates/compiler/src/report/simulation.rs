@@ -4,14 +4,15 @@ use std::fmt::Write as _;
 
 use drawing::Span;
 use kinematics::Machine;
+use schemars::JsonSchema;
 use serde::Serialize;
 use simulation::{Drive, SetpointKind, Worst};
 
-use super::text;
+use super::{round, text};
 use crate::simulate::Simulated;
 
 /// The report of a simulation. Lengths are mm, times s.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SimulationReport {
     /// Name of the machine.
     pub machine: String,
@@ -19,14 +20,15 @@ pub struct SimulationReport {
     pub setpoints: &'static str,
     /// Simulated time, s.
     pub duration_s: f64,
-    /// The distances between ink and drawing.
+    /// The distances between ink and drawing: a part of the report of its own.
+    #[serde(skip)]
     pub ink: InkReport,
     /// Tails drawn because the pen moved while the machine still moved.
     pub tails: TailsReport,
     /// The largest overshoot at a corner.
     pub overshoot: OvershootReport,
     /// The motors.
-    pub motors: Vec<MotorReport>,
+    pub motors: Vec<SimulatedMotor>,
     /// With setpoints `vertices`: vertices that were given up.
     pub unreached_vertices: usize,
     /// The limit of `--within`; `null` without one.
@@ -36,7 +38,7 @@ pub struct SimulationReport {
 }
 
 /// Distances between ink and drawing.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct InkReport {
     /// Length of the ink.
     pub length_mm: f64,
@@ -53,14 +55,14 @@ pub struct InkReport {
     /// Root mean square over the drawing's length.
     pub missed_rms_mm: f64,
     /// Where ink strays furthest.
-    pub worst_stray: Option<PlaceReport>,
+    pub worst_stray: Option<InkPlace>,
     /// Where the drawing is missed most.
-    pub worst_missed: Option<PlaceReport>,
+    pub worst_missed: Option<InkPlace>,
 }
 
 /// A place in drawing, file and time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PlaceReport {
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct InkPlace {
     /// Machine coordinates.
     pub x_mm: f64,
     /// Machine coordinates.
@@ -73,20 +75,20 @@ pub struct PlaceReport {
     pub at_s: Option<f64>,
 }
 
-impl PlaceReport {
+impl InkPlace {
     fn of(worst: &Worst) -> Self {
         Self {
-            x_mm: worst.point_mm.x,
-            y_mm: worst.point_mm.y,
+            x_mm: round::mm(worst.point_mm.x),
+            y_mm: round::mm(worst.point_mm.y),
             stroke: worst.stroke + 1,
             byte: (worst.source != Span::default()).then_some(worst.source.start),
-            at_s: worst.at_s,
+            at_s: worst.at_s.map(round::s),
         }
     }
 }
 
 /// Tails at pen downs and pen ups.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TailsReport {
     /// How many.
     pub count: usize,
@@ -97,17 +99,17 @@ pub struct TailsReport {
 }
 
 /// Overshoot at corners.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct OvershootReport {
     /// The largest.
     pub max_mm: f64,
     /// At which corner.
-    pub place: Option<PlaceReport>,
+    pub place: Option<InkPlace>,
 }
 
 /// One motor.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MotorReport {
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SimulatedMotor {
     /// Its name.
     pub name: String,
     /// The largest distance from the setpoint.
@@ -139,19 +141,19 @@ impl SimulationReport {
     pub fn of(machine: &Machine, drive: &Drive, simulated: &Simulated, within_mm: Option<f64>) -> Self {
         let ink = &simulated.ink;
         let motors = simulated.outcome.motors.iter().zip(&simulated.margins).zip(machine.motors());
-        let motors = motors.map(|((motor, margins), named)| MotorReport {
+        let motors = motors.map(|((motor, margins), named)| SimulatedMotor {
             name: named.name.clone(),
-            error_max_ticks: motor.error_max_ticks,
-            error_rms_ticks: motor.error_rms_ticks,
-            saturated_share: motor.saturated_share,
-            rest_error_ticks: motor.rest_error_ticks,
-            swing_ticks: motor.swing_ticks,
-            lost_ticks: motor.lost_ticks,
-            torque_share: motor.torque.map(|(share, _)| share),
-            beyond_data_ticks_s: motor.torque.map(|(_, beyond)| beyond),
+            error_max_ticks: round::ticks(motor.error_max_ticks),
+            error_rms_ticks: round::ticks(motor.error_rms_ticks),
+            saturated_share: round::share(motor.saturated_share),
+            rest_error_ticks: round::ticks(motor.rest_error_ticks),
+            swing_ticks: round::ticks(motor.swing_ticks),
+            lost_ticks: round::ticks(motor.lost_ticks),
+            torque_share: motor.torque.map(|(share, _)| round::share(share)),
+            beyond_data_ticks_s: motor.torque.map(|(_, beyond)| round::ticks(beyond)),
             stable: margins.map(|margins| margins.stable),
-            gain_margin: margins.map(|margins| margins.gain).filter(|gain| gain.is_finite()),
-            phase_margin_deg: margins.map(|margins| margins.phase_deg),
+            gain_margin: margins.map(|margins| round::ticks(margins.gain)).filter(|gain| gain.is_finite()),
+            phase_margin_deg: margins.map(|margins| round::ticks(margins.phase_deg)),
         });
         let larger = ink.stray.max_mm.max(ink.missed.max_mm);
         Self {
@@ -161,26 +163,26 @@ impl SimulationReport {
                 SetpointKind::Held => "held",
                 SetpointKind::Interpolated => "interpolated",
             },
-            duration_s: simulated.outcome.duration_s,
+            duration_s: round::s(simulated.outcome.duration_s),
             ink: InkReport {
-                length_mm: ink.ink_mm,
-                stray_max_mm: ink.stray.max_mm,
-                stray_p99_mm: ink.stray.p99_mm,
-                stray_rms_mm: ink.stray.rms_mm,
-                missed_max_mm: ink.missed.max_mm,
-                missed_p99_mm: ink.missed.p99_mm,
-                missed_rms_mm: ink.missed.rms_mm,
-                worst_stray: ink.worst_stray.as_ref().map(PlaceReport::of),
-                worst_missed: ink.worst_missed.as_ref().map(PlaceReport::of),
+                length_mm: round::mm(ink.ink_mm),
+                stray_max_mm: round::mm(ink.stray.max_mm),
+                stray_p99_mm: round::mm(ink.stray.p99_mm),
+                stray_rms_mm: round::mm(ink.stray.rms_mm),
+                missed_max_mm: round::mm(ink.missed.max_mm),
+                missed_p99_mm: round::mm(ink.missed.p99_mm),
+                missed_rms_mm: round::mm(ink.missed.rms_mm),
+                worst_stray: ink.worst_stray.as_ref().map(InkPlace::of),
+                worst_missed: ink.worst_missed.as_ref().map(InkPlace::of),
             },
             tails: TailsReport {
                 count: ink.tails.count,
-                longest_mm: ink.tails.longest_mm,
-                total_mm: ink.tails.total_mm,
+                longest_mm: round::mm(ink.tails.longest_mm),
+                total_mm: round::mm(ink.tails.total_mm),
             },
             overshoot: OvershootReport {
-                max_mm: ink.overshoot_max_mm,
-                place: ink.overshoot.as_ref().map(PlaceReport::of),
+                max_mm: round::mm(ink.overshoot_max_mm),
+                place: ink.overshoot.as_ref().map(InkPlace::of),
             },
             motors: motors.collect(),
             unreached_vertices: simulated.outcome.unreached,
@@ -215,7 +217,7 @@ impl SimulationReport {
             }
         }
         if self.overshoot.max_mm > 0.0 {
-            let place = self.overshoot.place.as_ref().map(PlaceReport::text).unwrap_or_default();
+            let place = self.overshoot.place.as_ref().map(InkPlace::text).unwrap_or_default();
             let _ = writeln!(out, "corner overshoot   {:.3} mm at most, {place}", self.overshoot.max_mm);
         }
         let tails = &self.tails;
@@ -244,7 +246,7 @@ impl SimulationReport {
     }
 }
 
-impl PlaceReport {
+impl InkPlace {
     fn text(&self) -> String {
         let mut out = format!("({:.2}, {:.2}) mm, stroke {}", self.x_mm, self.y_mm, self.stroke);
         if let Some(byte) = self.byte {
@@ -257,7 +259,7 @@ impl PlaceReport {
     }
 }
 
-impl MotorReport {
+impl SimulatedMotor {
     fn text(&self) -> String {
         let mut out = format!(
             "tracking error {:.2} ticks max, {:.2} RMS; at its limit {:.1} % of the time",
@@ -290,23 +292,50 @@ impl MotorReport {
     }
 }
 
-/// A step response as text.
-pub fn step_text(motor: &str, step: f64, response: &simulation::StepResponse) -> String {
-    let mut out = format!("motor {motor}, step of {step} ticks\n");
-    let _ = writeln!(out, "overshoot   {:.0} ticks", response.overshoot_ticks);
-    let _ = match response.settling_s {
-        Some(time) => writeln!(out, "settling    {time:.3} s (within 2 % of the step)"),
-        None => writeln!(out, "settling    not within the simulated time"),
-    };
-    let _ = writeln!(
-        out,
-        "rest        {:.0} ticks, {:.0} from the setpoint",
-        response.rest_ticks,
-        step - response.rest_ticks
-    );
-    if response.swing_ticks >= 1.0 {
-        let _ =
-            writeln!(out, "still moves by {:.0} ticks in the last quarter of the time", response.swing_ticks);
+/// A step response.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StepReport {
+    /// The motor.
+    pub motor: String,
+    /// The step, ticks.
+    pub ticks: f64,
+    /// The largest position beyond the setpoint, ticks; 0 without overshoot.
+    pub overshoot_ticks: f64,
+    /// From when on the motor stays within 2 % of the step of its last position, s; `null` while it moves on.
+    pub settling_s: Option<f64>,
+    /// The last position, ticks.
+    pub rest_ticks: f64,
+    /// From lowest to highest position in the last quarter of the time, ticks.
+    pub swing_ticks: f64,
+}
+
+impl StepReport {
+    /// The report of a step response.
+    pub fn of(motor: &str, ticks: f64, response: &simulation::StepResponse) -> Self {
+        Self {
+            motor: motor.to_owned(),
+            ticks,
+            overshoot_ticks: round::ticks(response.overshoot_ticks),
+            settling_s: response.settling_s.map(round::s),
+            rest_ticks: round::ticks(response.rest_ticks),
+            swing_ticks: round::ticks(response.swing_ticks),
+        }
     }
-    out
+
+    /// The report as text.
+    pub fn text(&self) -> String {
+        let mut out = format!("motor {}, step of {} ticks\n", self.motor, self.ticks);
+        let _ = writeln!(out, "overshoot   {:.0} ticks", self.overshoot_ticks);
+        let _ = match self.settling_s {
+            Some(time) => writeln!(out, "settling    {time:.3} s (within 2 % of the step)"),
+            None => writeln!(out, "settling    not within the simulated time"),
+        };
+        let off = self.ticks - self.rest_ticks;
+        let _ = writeln!(out, "rest        {:.0} ticks, {off:.0} from the setpoint", self.rest_ticks);
+        if self.swing_ticks >= 1.0 {
+            let _ =
+                writeln!(out, "still moves by {:.0} ticks in the last quarter of the time", self.swing_ticks);
+        }
+        out
+    }
 }

@@ -2,13 +2,14 @@
 
 use std::fmt::Write as _;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use simulation::{Estimate, Identified};
 
 use crate::tune::{Measure, Tuning};
 
 /// The result of a search. Lengths are mm, times s.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TuningReport {
     /// What each measure buys, each on top of the last one.
     pub measures: Vec<Measure>,
@@ -25,7 +26,7 @@ pub struct TuningReport {
 }
 
 /// One parameter off.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct OffReport {
     /// Its key.
     pub key: &'static str,
@@ -128,7 +129,7 @@ fn limits(tuning: &Tuning) -> String {
 }
 
 /// An identified motor.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MotorEstimates {
     /// Speed without load per percent of duty.
     pub speed_per_duty_ticks_s: EstimateReport,
@@ -144,8 +145,8 @@ pub struct MotorEstimates {
     pub residual_rms_ticks: f64,
 }
 
-/// A value with its standard deviation; both `null` where they are not finite.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// A value with its standard deviation; `null` where it is not finite.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EstimateReport {
     /// The value.
     pub value: f64,

@@ -178,5 +178,15 @@ fn scene(arguments: &Emulate, machine: Option<&LoadedMachine>, ink: &backends::I
     let reach = machine.map_or_else(Vec::new, |machine| kinematics::reach_outlines(&machine.machine));
     let title = "what the machine drew".to_owned();
     let colors = picture::PenColors::new();
-    Scene { title, sheet, reach, shades: None, reference: Vec::new(), ink, colors, travel: Vec::new(), start: None }
+    Scene {
+        title,
+        sheet,
+        reach,
+        shades: None,
+        reference: Vec::new(),
+        ink,
+        colors,
+        travel: Vec::new(),
+        start: None,
+    }
 }

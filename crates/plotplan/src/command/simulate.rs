@@ -5,20 +5,20 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use compiler::machine_file::MachineFile;
-use compiler::report::simulation::SimulationReport;
+use compiler::report::simulation::{SimulationReport, StepReport};
+use compiler::report::{Code, ErrorReport};
 use compiler::{layout, replay, scene, simulate};
 use drawing::{Affine, Drawing, Point};
 use kinematics::{Machine, MotorPos};
 use plan::Row;
-use serde_json::json;
 use simulation::{Drive, Sample, SetpointKind, StepResponse};
 use verify::Mismatch;
 
-use crate::cli::{ReportForm, Setpoints, Simulate};
+use crate::cli::{Setpoints, Simulate};
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
 use crate::machines::{self, LoadedMachine};
-use crate::{output, terminal};
+use crate::{output, session, terminal};
 
 /// A picture's longer side, pixels.
 const PIXELS: u32 = 1600;
@@ -80,14 +80,26 @@ pub(crate) fn run(arguments: &Simulate) -> Result<(), Failure> {
         }
     }
     for motor in report.motors.iter().filter(|motor| motor.stable == Some(false)) {
-        terminal::warning(&format!("the loop of motor {} is unstable", motor.name));
+        terminal::warning(Code::UnstableLoop, &format!("the loop of motor {} is unstable", motor.name));
     }
-    let text = match arguments.report {
-        ReportForm::Text => report.text(),
-        ReportForm::Json => format!("{}\n", json!(report)),
-    };
-    output::write("-", |out| out.write_all(text.as_bytes()))?;
-    if report.holds { Ok(()) } else { Err(Failure::Refused) }
+    let text = report.text();
+    let (holds, ink) = (report.holds, report.ink.clone());
+    session::report(|all| {
+        all.ink = Some(ink);
+        all.simulation = Some(report);
+    });
+    output::report(&text)?;
+    if !holds {
+        // The text names the distances; there is no need for another message.
+        session::failed(ErrorReport {
+            code: Code::InkError,
+            message: "predicted ink is further from the drawing than --within".to_owned(),
+            help: None,
+            place: None,
+        });
+        return Err(Failure::Refused);
+    }
+    input::refuse_warnings(arguments.reading.strict)
 }
 
 /// The extension of the output, if there is one.
@@ -158,7 +170,7 @@ fn load_plan(arguments: &Simulate, input: &Input) -> Result<LoadedPlan, Failure>
     let header = &plan.table.header;
     for mismatch in verify::mismatches(&machine, header) {
         if matches!(mismatch, Mismatch::Limit { .. }) {
-            terminal::warning(&mismatch.to_string());
+            terminal::warning(Code::PlanMismatch, &mismatch.to_string());
         } else {
             return Err(Failure::Usage(anyhow::Error::new(mismatch).context(input.name.clone())));
         }
@@ -238,22 +250,10 @@ fn step_response(arguments: &Simulate, step: f64, kind: Option<&str>) -> Result<
             _ => simulate::step_svg(&response, step, out),
         })?;
     }
-    let name = &motors[index].name;
-    let text = match arguments.report {
-        ReportForm::Text => compiler::report::simulation::step_text(name, step, &response),
-        ReportForm::Json => format!(
-            "{}\n",
-            json!({ "step": {
-                "motor": name,
-                "ticks": step,
-                "overshoot_ticks": response.overshoot_ticks,
-                "settling_s": response.settling_s,
-                "rest_ticks": response.rest_ticks,
-                "swing_ticks": response.swing_ticks,
-            }})
-        ),
-    };
-    output::write("-", |out| out.write_all(text.as_bytes()))
+    let report = StepReport::of(&motors[index].name, step, &response);
+    let text = report.text();
+    session::report(|all| all.step = Some(report));
+    output::report(&text)
 }
 
 /// A step response as `tune --from-step` reads it.

@@ -2,20 +2,19 @@
 
 use anyhow::Context as _;
 use compiler::machine_file::{drive_keys, with_drive};
-use compiler::report::tuning;
+use compiler::report::{Code, tuning};
 use compiler::tune;
-use serde_json::json;
 
 use super::simulate::{LoadedPlan, drive, load_drawing};
-use crate::cli::{ReportForm, Tune};
+use crate::cli::Tune;
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
 use crate::machines::{self, LoadedMachine};
-use crate::output;
+use crate::{output, session, terminal};
 
 pub(crate) fn run(arguments: &Tune) -> Result<(), Failure> {
     if let Some(file) = &arguments.from_step {
-        return from_step(arguments, file);
+        return from_step(file);
     }
     let name = arguments.machine.as_deref().unwrap_or_default();
     let toml = machines::machine_toml(name)?;
@@ -41,16 +40,13 @@ pub(crate) fn run(arguments: &Tune) -> Result<(), Failure> {
         let text = with_drive(&toml, &tuned.drive).context("the machine file").map_err(Failure::Usage)?;
         output::write(to, |out| out.write_all(text.as_bytes()))?;
     }
-    let text = match arguments.report {
-        ReportForm::Text => {
-            let keys = drive_keys(&tuned.drive);
-            let keys = keys.iter().map(|(key, value)| format!("{key} = {}\n", value.to_string().trim()));
-            let table: String = keys.collect();
-            format!("{}\n[drive]\n{table}", tuning::text(&plan.name, plan.machine.name(), &tuned))
-        }
-        ReportForm::Json => format!("{}\n", json!(tuning::TuningReport::of(&tuned))),
-    };
-    output::write("-", |out| out.write_all(text.as_bytes()))
+    let keys = drive_keys(&tuned.drive);
+    let keys = keys.iter().map(|(key, value)| format!("{key} = {}\n", value.to_string().trim()));
+    let table: String = keys.collect();
+    let text = tuning::text(&plan.name, plan.machine.name(), &tuned);
+    session::report(|all| all.tuning = Some(tuning::TuningReport::of(&tuned)));
+    output::report(&format!("{text}\n[drive]\n{table}"))?;
+    input::refuse_warnings(arguments.reading.strict)
 }
 
 /// The plan of the test pattern in the middle of the sheet, as large as it is or smaller.
@@ -59,14 +55,18 @@ fn test_pattern(machine: LoadedMachine) -> Result<LoadedPlan, Failure> {
     // The options of a drawing as the command line would give them.
     let words = ["plotplan", "tune", "--machine", "x", "--drawing", "x", "--shrink"];
     let arguments = crate::cli::Arguments::try_parse_from(words);
-    let Ok(crate::cli::Arguments { command: crate::cli::Command::Tune(options) }) = arguments else {
+    let Ok(crate::cli::Arguments { command: crate::cli::Command::Tune(options), .. }) = arguments else {
         return Err(Failure::Usage(anyhow::anyhow!("the test pattern needs --shrink")));
     };
-    let input = Input { name: "test pattern".into(), bytes: tune::TEST_PATTERN.to_vec() };
+    let input = Input {
+        name: "test pattern".into(),
+        path: "test pattern".into(),
+        bytes: tune::TEST_PATTERN.to_vec(),
+    };
     load_drawing(&Inputs::of(input), machine, &options.reading, &options.planning)
 }
 
-fn from_step(arguments: &Tune, file: &str) -> Result<(), Failure> {
+fn from_step(file: &str) -> Result<(), Failure> {
     let input = input::read(file)?;
     let text = String::from_utf8_lossy(&input.bytes);
     let record = tune::read_record(&text)
@@ -75,13 +75,10 @@ fn from_step(arguments: &Tune, file: &str) -> Result<(), Failure> {
         .with_context(|| format!("{} cannot be used", input.name))
         .map_err(Failure::Drawing)?;
     let report = tuning::MotorEstimates::of(&found);
-    let text = match arguments.report {
-        ReportForm::Text => report.text(record.len()),
-        ReportForm::Json => format!("{}\n", json!({ "motor": report })),
-    };
-    output::write("-", |out| out.write_all(text.as_bytes()))?;
-    match report.undetermined() {
-        None => Ok(()),
-        Some(what) => Err(Failure::Drawing(anyhow::anyhow!("{}: {what}", input.name))),
-    }
+    let (text, open) = (report.text(record.len()), report.undetermined());
+    session::report(|all| all.motor = Some(report));
+    output::report(&text)?;
+    let Some(what) = open else { return Ok(()) };
+    terminal::error(Code::Undetermined, &format!("{}: {what}", input.name));
+    Err(Failure::Refused)
 }
