@@ -1,5 +1,6 @@
 //! Drawings as output, pens, crop, copies, and several files in one command.
 
+use std::fmt::Write as _;
 use std::process::Output;
 
 use assert_cmd::cargo::cargo_bin;
@@ -143,7 +144,7 @@ fn ordering_of_drawing_outputs_reduces_travel_and_removes_duplicates() {
     let dir = TestDir::new();
     let mut file = "IN;SP1;".to_owned();
     for k in [0, 7, 2, 9, 4, 1, 8, 3, 6, 5, 0, 7] {
-        file += &format!("PU{0},0;PD{0},400;", 400 * k);
+        write!(file, "PU{0},0;PD{0},400;", 400 * k).expect("text");
     }
     dir.write("lines.hpgl", file);
     succeed(&dir, "convert lines.hpgl -o same.hpgl");
@@ -249,4 +250,15 @@ fn folder_takes_a_file_for_each_drawing() {
     assert!(
         fail(&dir, "convert a.hpgl plans/a.hpgl -o plans/ --format svg", 2).contains("would both be written")
     );
+}
+
+#[test]
+fn options_for_drawings_are_refused_on_plans() {
+    let dir = drawings();
+    succeed(&dir, "convert a.hpgl -m corexy -o plan.csv");
+    for command in
+        ["info plan.csv --only-pens 1", "info plan.csv --page 2", "preview plan.csv -o x.svg --scale 2"]
+    {
+        assert!(fail(&dir, command, 2).contains("has no effect on a plan"), "{command}");
+    }
 }

@@ -70,8 +70,7 @@ fn compare(file: &Path) -> Result<Row> {
     let bytes = std::fs::read(file)?;
     let options = svg::Options { outline_fills: true, ..svg::Options::default() };
     let ours = svg::read(&bytes, &options);
-    let ink: Vec<Vec<Point>> =
-        ours.drawing.strokes.iter().map(|stroke| stroke.flatten(CHORD_MM)).collect();
+    let ink: Vec<Vec<Point>> = ours.drawing.strokes.iter().map(|stroke| stroke.flatten(CHORD_MM)).collect();
     let tree = usvg::Tree::from_data(&bytes, &usvg::Options::default()).context("usvg cannot read it")?;
     let mut theirs = Theirs { height_mm: ours.page_mm[1], ..Theirs::default() };
     theirs.group(tree.root());

@@ -275,7 +275,7 @@ pub(crate) struct Layout {
     /// Renumber pens: the file's pen OLD becomes pen NEW
     #[arg(long, value_name = "OLD=NEW,...", value_delimiter = ',', value_parser = pen_pair)]
     pub(crate) pen_map: Vec<(u16, u16)>,
-    /// Repeat the drawing in a grid of COLUMNSxROWS
+    /// Repeat the drawing in a grid of columns and rows, such as 3x2
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = grid)]
     pub(crate) copies: Option<(u16, u16)>,
     /// Distance between the copies

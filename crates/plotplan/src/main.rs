@@ -44,6 +44,7 @@ fn main() -> ExitCode {
     };
     arguments.settle();
     session::begin(&arguments.messages, arguments.command.name());
+    options::remember(&matches);
     let result = match options::without_effect(&matches) {
         Some(what) => Err(Failure::Usage(anyhow::anyhow!(what))),
         None => command::run(&arguments, &cli::plan_options(&matches)),

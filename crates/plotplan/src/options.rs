@@ -1,9 +1,12 @@
 //! Options that would have no effect are refused, for all commands in one place.
 
+use std::sync::OnceLock;
+
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 
 use crate::cli::{self, Format};
+use crate::failure::Failure;
 
 /// Options of planning proper.
 const PLANNING: [&str; 12] = [
@@ -70,6 +73,25 @@ pub(crate) fn without_effect(matches: &ArgMatches) -> Option<String> {
             let is_outlines = options.text("text") == "outlines";
             options.refuse(&["font"], "without --text outlines").filter(|_| !is_outlines)
         })
+}
+
+/// Why the first option given that is for drawings only has no effect on a plan. Whether the input is
+/// a plan shows only when it is read.
+static ON_PLANS: OnceLock<Option<String>> = OnceLock::new();
+
+/// Remembers the options for [`refuse_on_plan`].
+pub(crate) fn remember(matches: &ArgMatches) {
+    let options = matches.subcommand().map(|(_, given)| Given(given));
+    let all = [&READING[..], &PLANNING, &PLACEMENT].concat();
+    let _ = ON_PLANS.set(options.and_then(|options| options.refuse(&all, "on a plan")));
+}
+
+/// Refuses options that are for drawings, where the input is a plan.
+pub(crate) fn refuse_on_plan() -> Result<(), Failure> {
+    match ON_PLANS.get().and_then(Option::clone) {
+        Some(what) => Err(Failure::Usage(anyhow::anyhow!(what))),
+        None => Ok(()),
+    }
 }
 
 /// The options of one command.

@@ -15,7 +15,7 @@ use crate::cli::Info;
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs, LoadedDrawing};
 use crate::machines;
-use crate::{output, session};
+use crate::{options, output, session};
 
 /// Lengths are measured along the plan's own ink: any tolerance does.
 const TOLERANCE_MM: f64 = 1.0;
@@ -168,6 +168,7 @@ fn of_program(input: &Input, program: &str) -> String {
 }
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
+    options::refuse_on_plan()?;
     let (plan, machine) = super::verify::plan(input, machine)?;
     let header = &plan.table.header;
     let mut text = format!("plan     {}\n", input.path);

@@ -11,7 +11,7 @@ use crate::cli::{PictureFormat, Preview};
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
 use crate::machines;
-use crate::{output, session};
+use crate::{options, output, session};
 
 /// A picture's longer side, pixels.
 const PIXELS: u32 = 1600;
@@ -92,6 +92,7 @@ fn of_drawing(inputs: &Inputs, arguments: &Preview) -> Result<Scene, Failure> {
 }
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
+    options::refuse_on_plan()?;
     let (plan, machine) = super::verify::plan(input, machine)?;
     let machine = &machine.machine;
     let title = format!("{} on {}", input.name, machine.name());

@@ -22,7 +22,9 @@ pub(super) fn run(job: &Job<'_>, names: &Names) -> Result<(), Failure> {
             .map_err(|error| Failure::writing(error, &folder.display().to_string()))?;
     }
     // Outputs replace none of the inputs, also of those that are read later.
-    files.iter().for_each(|file| input::remember(Path::new(file)));
+    for file in files {
+        input::remember(Path::new(file));
+    }
     let next = AtomicUsize::new(0);
     let (sender, receiver) = mpsc::channel();
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(files.len());
