@@ -5,7 +5,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use crate::{
     error::PlanError,
-    path::{CornerBlend, PathBudget},
+    path::{Aim, CornerBlend, PathBudget},
     time_parametrization::Easing,
 };
 
@@ -77,6 +77,10 @@ pub(crate) struct ToleranceBudget {
     pub(crate) row_mm: f64,
     /// For the path itself.
     pub(crate) path: PathBudget,
+    /// For a spline in place of the path, mm.
+    pub(crate) spline_mm: f64,
+    /// What that spline aims at.
+    pub(crate) aim: Aim,
 }
 
 impl ToleranceBudget {
@@ -113,6 +117,8 @@ impl ToleranceBudget {
         let corner = if jerk { CornerBlend::Spline } else { CornerBlend::Parabola };
         Self {
             row_mm: row,
+            spline_mm: path,
+            aim: if jerk { Aim::Smoothest } else { Aim::Fastest },
             path: PathBudget {
                 chord_mm: 0.5 * path,
                 simplify_mm: simplify,

@@ -5,9 +5,9 @@ use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
     joint_path::{JointPath, PathGeometry},
-    path::{PathBudget, Piece, Section, sections, vertex_to_vertex},
+    path::{Limits, PathBudget, Piece, Section, fitted, sections, vertex_to_vertex},
     settings::{Settings, TimingLaw, ToleranceBudget},
-    time_parametrization::{Profile, SpeedCap, fixed_duration, profile},
+    time_parametrization::{Profile, SpeedCap, fixed_duration, profile, rough_duration},
 };
 
 /// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops
@@ -30,9 +30,22 @@ pub(crate) struct PlannedStroke {
     pub(crate) motions: Vec<PathMotion>,
 }
 
+/// Joint paths, and the pose at the end of each.
+type Lifted = Vec<(JointPath, JointPos)>;
+
+/// Ratios of rough durations that decide between two ways to draw a stroke.
+const CLEARLY_FASTER: f64 = 0.97;
+const CLEARLY_SLOWER: f64 = 1.05;
+
 impl PlannedStroke {
     pub(crate) fn end(&self) -> JointPos {
         self.motions.last().map_or(self.start, |last| last.end)
+    }
+
+    /// Periods, and seconds where those are equal.
+    fn duration_key(&self) -> (u64, f64) {
+        let periods = self.motions.iter().map(|motion| motion.periods).sum();
+        (periods, self.motions.iter().map(|motion| motion.profile.duration_s).sum())
     }
 }
 
@@ -93,31 +106,67 @@ impl StrokePlanner<'_> {
     pub(crate) fn plan_from(&self, stroke: &Stroke, pose: JointPos) -> Result<PlannedStroke, OutOfReach> {
         let exact = PathBudget { simplify_mm: 0.0, blend_mm: 0.0, ..self.budget.path };
         match self.settings.timing_law {
-            TimingLaw::TimeOptimal => self
-                .plan_sections(stroke, pose, sections(stroke, &self.budget.path))
-                .or_else(|_| self.plan_sections(stroke, pose, sections(stroke, &exact))),
+            TimingLaw::TimeOptimal => {
+                let blended = self
+                    .lift(stroke, pose, sections(stroke, &self.budget.path))
+                    .or_else(|_| self.lift(stroke, pose, sections(stroke, &exact)))?;
+                Ok(match self.spline(stroke, pose) {
+                    Some(spline) => self.faster(stroke, pose, blended, spline),
+                    None => self.planned(stroke, pose, blended),
+                })
+            }
             TimingLaw::Trapezoid | TimingLaw::FixedDuration { .. } => {
-                self.plan_sections(stroke, pose, vertex_to_vertex(stroke, &exact))
+                let paths = self.lift(stroke, pose, vertex_to_vertex(stroke, &exact))?;
+                Ok(self.planned(stroke, pose, paths))
             }
         }
     }
 
-    fn plan_sections(
-        &self,
-        stroke: &Stroke,
-        start: JointPos,
-        sections: Vec<Section>,
-    ) -> Result<PlannedStroke, OutOfReach> {
-        let mut planned = PlannedStroke { start, motions: Vec::with_capacity(sections.len()) };
-        let speed = self.settings.speed_of(self.machine, stroke.pen);
+    /// The joint paths of some sections, and the pose at the end of each.
+    fn lift(&self, stroke: &Stroke, start: JointPos, sections: Vec<Section>) -> Result<Lifted, OutOfReach> {
+        let mut lifted = Vec::with_capacity(sections.len());
+        let mut pose = start;
         for section in sections {
             let end = section.last().map_or(stroke.start(), |piece| piece.curve.end());
-            let path =
-                JointPath::from_section(self.machine, section, planned.end(), self.settings.tolerance_mm)?;
-            let end = self.end_pose(&path, end)?;
-            planned.motions.push(self.parametrize(path, end, speed));
+            let path = JointPath::from_section(self.machine, section, pose, self.settings.tolerance_mm)?;
+            pose = self.end_pose(&path, end)?;
+            lifted.push((path, pose));
         }
-        Ok(planned)
+        Ok(lifted)
+    }
+
+    /// The stroke as one spline; `None` where there is none within the tolerance and the reach.
+    fn spline(&self, stroke: &Stroke, start: JointPos) -> Option<Lifted> {
+        let limits = Limits::new(self.machine, self.settings.speed_of(self.machine, stroke.pen));
+        let section = fitted(stroke, &limits, self.budget.spline_mm, self.budget.aim)?;
+        self.lift(stroke, start, vec![section]).ok()
+    }
+
+    /// The motion along the faster one of two ways to draw a stroke.
+    ///
+    /// The duration on the path's own grid, without refinement and without jerk limits, is within
+    /// some per cent of the final one and takes a twentieth of the time to compute. Where it does
+    /// not decide, both motions are computed.
+    fn faster(&self, stroke: &Stroke, start: JointPos, blended: Lifted, spline: Lifted) -> PlannedStroke {
+        let cap = self.cap(self.settings.speed_of(self.machine, stroke.pen));
+        let rough =
+            |paths: &Lifted| paths.iter().map(|(path, _)| rough_duration(self.machine, path, &cap)).sum::<f64>();
+        let ratio = rough(&spline) / rough(&blended);
+        if ratio < CLEARLY_FASTER {
+            return self.planned(stroke, start, spline);
+        }
+        if ratio > CLEARLY_SLOWER {
+            return self.planned(stroke, start, blended);
+        }
+        let (blended, spline) = (self.planned(stroke, start, blended), self.planned(stroke, start, spline));
+        if spline.duration_key() < blended.duration_key() { spline } else { blended }
+    }
+
+    /// The fastest motion along the paths of a stroke.
+    fn planned(&self, stroke: &Stroke, start: JointPos, paths: Lifted) -> PlannedStroke {
+        let speed = self.settings.speed_of(self.machine, stroke.pen);
+        let motions = paths.into_iter().map(|(path, end)| self.parametrize(path, end, speed)).collect();
+        PlannedStroke { start, motions }
     }
 
     /// The pose at the end of a path, with angles unwrapped along its intervals.
@@ -144,10 +193,14 @@ impl StrokePlanner<'_> {
             let profile = fixed_duration(easing, length, periods as f64 * period);
             return PathMotion { geometry: path.geometry, profile, end, periods };
         }
-        let cap = SpeedCap { pen_mm_s, row_deviation_mm: self.budget.row_mm, period_s: period };
+        let cap = self.cap(pen_mm_s);
         let profile = profile(self.machine, &path, &cap);
         let periods = whole_periods(profile.duration_s, period).max(1);
         PathMotion { geometry: path.geometry, profile, end, periods }
+    }
+
+    fn cap(&self, pen_mm_s: f64) -> SpeedCap {
+        SpeedCap { pen_mm_s, row_deviation_mm: self.budget.row_mm, period_s: self.period() }
     }
 
     /// The motion with the pen up between two poses; `None` if they are equal.

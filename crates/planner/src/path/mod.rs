@@ -9,6 +9,7 @@
 //! reversals.
 
 mod blend;
+mod fit;
 mod piece;
 mod simplify;
 mod slow_zones;
@@ -17,6 +18,7 @@ mod tangent;
 use drawing::{Line, Segment, Stroke};
 
 pub use blend::CornerBlend;
+pub use fit::{Aim, Limits, fitted};
 pub use piece::{Piece, Section};
 use tangent::{direction_at, velocity};
 

@@ -56,6 +56,10 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
     profile.slowed(slower)
 }
 
+pub(super) fn rough_duration(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> f64 {
+    Grid::of(machine, path, cap).time()
+}
+
 /// On the path's own grid. Only intervals that begin and end at rest are divided.
 #[cfg(feature = "unstable")]
 pub(super) fn profile_without_refinement(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {

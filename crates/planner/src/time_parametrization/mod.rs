@@ -28,6 +28,11 @@ pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
     }
 }
 
+/// The duration on the path's own grid, without refinement and jerk limits, s.
+pub(crate) fn rough_duration(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> f64 {
+    acceleration::rough_duration(machine, path, cap)
+}
+
 /// The same on the path's own grid: without jerk limits and without refinement, ten times as fast
 /// to compute, with a duration within a few per cent of the optimum.
 #[cfg(feature = "unstable")]

@@ -1,0 +1,97 @@
+//! The limits of a machine around a point, as the fit uses them.
+
+use drawing::{Point, Vec2};
+use kinematics::{Machine, MotorPos};
+
+/// The machine and the pen's speed.
+#[derive(Debug)]
+pub struct Limits<'a> {
+    machine: &'a Machine,
+    /// Largest squared speed of the pen, mm²/s².
+    pub(super) square_pen_speed: f64,
+    /// The squared ratio of each motor's acceleration limit to its speed limit, 1/s².
+    pub(super) square_ratios: [f64; 2],
+    /// The derivatives everywhere on a machine with linear kinematics.
+    everywhere: Option<MotorForms>,
+}
+
+/// How a motor's derivatives follow from those of the pen, near a point, relative to its
+/// acceleration limit: `m' = j · p'`, `m'' = j · p'' + p'ᵀ q p'`. Over the width of the tolerance
+/// both are even, so they are taken at the samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MotorForms {
+    pub(super) linear: [Vec2; 2],
+    /// xx, xy and yy of the symmetric matrix q.
+    pub(super) quadratic: [[f64; 3]; 2],
+}
+
+impl<'a> Limits<'a> {
+    /// For a machine, with the pen at most this fast.
+    pub fn new(machine: &'a Machine, pen_mm_s: f64) -> Self {
+        let square_ratios = machine.motors().each_ref().map(|motor| {
+            let ratio = motor.max_acceleration_ticks_s2 / motor.max_speed_ticks_s;
+            ratio * ratio
+        });
+        let mut limits = Self { machine, square_pen_speed: pen_mm_s * pen_mm_s, square_ratios, everywhere: None };
+        if machine.mechanism().is_linear() {
+            limits.everywhere = limits.evaluate(machine.sheet().center());
+        }
+        limits
+    }
+
+    /// The forms near a point; `None` if it is out of reach.
+    pub(super) fn near(&self, p: Point) -> Option<MotorForms> {
+        self.everywhere.or_else(|| self.evaluate(p))
+    }
+
+    fn evaluate(&self, p: Point) -> Option<MotorForms> {
+        let pose = self.machine.mechanism().inverse(p).ok()?;
+        let of = |x: f64, y: f64| self.machine.motor_derivatives(&pose, Vec2::new(x, y), Vec2::ZERO);
+        let ((x, xx), (y, yy), (_, both)) = (of(1.0, 0.0), of(0.0, 1.0), of(1.0, 1.0));
+        let relative = |m: &MotorPos, k: usize| m[k] / self.machine.motors()[k].max_acceleration_ticks_s2;
+        Some(MotorForms {
+            linear: [0, 1].map(|k| Vec2::new(relative(&x, k), relative(&y, k))),
+            quadratic: [0, 1].map(|k| {
+                let (xx, yy, both) = (relative(&xx, k), relative(&yy, k), relative(&both, k));
+                [xx, 0.5 * (both - xx - yy), yy]
+            }),
+        })
+    }
+}
+
+impl MotorForms {
+    /// m' and m'' of motor k, and the derivative of m'' by p'.
+    #[inline]
+    pub(super) fn motor(&self, k: usize, first: Vec2, second: Vec2) -> (f64, f64, Vec2) {
+        let (j, [xx, xy, yy]) = (self.linear[k], self.quadratic[k]);
+        let half = Vec2::new(xx * first.x + xy * first.y, xy * first.x + yy * first.y);
+        (j.dot(first), j.dot(second) + half.dot(first), 2.0 * half)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use test_support::machines;
+
+    use super::*;
+
+    #[test]
+    fn forms_give_the_derivatives_of_the_motors() {
+        for machine in [machines::corexy(), machines::arm(), machines::polar()] {
+            let limits = Limits::new(&machine, 60.0);
+            let p = machine.sheet().center() + Vec2::new(3.0, 1.0);
+            let pose = machine.mechanism().inverse(p).expect("within reach");
+            let (first, second) = (Vec2::new(0.7, -0.4), Vec2::new(0.2, 1.3));
+            let (m1, m2) = machine.motor_derivatives(&pose, first, second);
+            let forms = limits.near(p).expect("within reach");
+            for k in 0..2 {
+                let limit = machine.motors()[k].max_acceleration_ticks_s2;
+                let (one, two, by_first) = forms.motor(k, first, second);
+                assert!((one * limit - m1[k]).abs() < 1e-9 * m1[k].abs());
+                assert!((two * limit - m2[k]).abs() < 1e-9 * m2[k].abs());
+                let ahead = forms.motor(k, first + Vec2::new(1e-6, 0.0), second).1;
+                assert!((by_first.x - (ahead - two) / 1e-6).abs() < 1e-5 * (1.0 + by_first.x.abs()));
+            }
+        }
+    }
+}
