@@ -246,6 +246,8 @@ struct Builder<'a> {
 fn initial_interval_count(piece: &Piece) -> usize {
     match &piece.curve {
         Segment::Line(_) => 1,
+        // The spans of a spline are short where it bends.
+        Segment::Cubic(_) if piece.row_bound.is_some() => 1,
         Segment::Arc(arc) => (arc.sweep_rad.abs() / 0.2).ceil().clamp(2.0, 1e6) as usize,
         Segment::Cubic(cubic) => {
             // The angle between the end tangents is how much a blend turns; other cubics may
@@ -427,14 +429,20 @@ impl PathDerivatives {
         let (velocity, acceleration) = piece.curve.derivatives(t);
         let (velocity, acceleration) = (piece.rate * velocity, piece.rate * piece.rate * acceleration);
         let pen_speed = velocity.hypot2().sqrt();
-        let normal_second_derivative = velocity.cross(acceleration).abs() / pen_speed;
+        let normal_second_derivative =
+            if pen_speed > 0.0 { velocity.cross(acceleration).abs() / pen_speed } else { 0.0 };
         let geometry = machine.mechanism();
         let (rates, _) = geometry.path_derivatives(pose, velocity, acceleration);
         let (first, second) = machine.motor_derivatives(pose, velocity, acceleration);
         // A nonuniform parameter does not bend a straight line; on a curve take all of p'' as a
         // bound.
-        let bending =
-            if matches!(piece.curve, Segment::Line(_)) { 0.0 } else { acceleration.hypot2().sqrt() };
+        let bending = match (&piece.curve, piece.row_bound) {
+            (Segment::Line(_), _) => 0.0,
+            // Where the path turns back the pen passes its tip with the acceleration of the motors.
+            (_, Some(bound)) if pen_speed > 1e-6 => normal_second_derivative.max(bound),
+            (_, Some(bound)) => acceleration.hypot2().sqrt().max(bound),
+            (_, None) => acceleration.hypot2().sqrt(),
+        };
         let second_derivative_bound = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
         Self { first, second, pen_speed, normal_second_derivative, second_derivative_bound }
     }

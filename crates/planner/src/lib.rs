@@ -6,7 +6,8 @@
 //! ```
 //! 1. `path`: a stroke becomes smooth **sections**: redundant vertices are removed within the
 //!    tolerance, corners are blended with parabolas, or with cubic splines where jerk is limited.
-//!    The pen stops only at reversals.
+//!    The pen stops only at reversals. Or it becomes one spline within the tolerance (`path::fit`),
+//!    if that is faster.
 //! 2. `joint_path`: inverse kinematics along a section gives a joint path, divided into **grid
 //!    intervals** with the motors' first and second derivatives at start, middle and end, and a
 //!    bound on how far linear motion between rows leaves the path.

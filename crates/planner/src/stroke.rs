@@ -5,7 +5,7 @@ use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
     joint_path::{JointPath, PathGeometry},
-    path::{Limits, PathBudget, Piece, Section, fitted, sections, vertex_to_vertex},
+    path::{Limits, PathBudget, Piece, Section, bound_speed, fitted, sections, vertex_to_vertex},
     settings::{Settings, TimingLaw, ToleranceBudget},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile, rough_duration},
 };
@@ -138,7 +138,11 @@ impl StrokePlanner<'_> {
     /// The stroke as one spline; `None` where there is none within the tolerance and the reach.
     fn spline(&self, stroke: &Stroke, start: JointPos) -> Option<Lifted> {
         let limits = Limits::new(self.machine, self.settings.speed_of(self.machine, stroke.pen));
-        let section = fitted(stroke, &limits, self.budget.spline_mm, self.budget.aim)?;
+        let mut section = fitted(stroke, &limits, self.budget.spline_mm, self.budget.aim)?;
+        let row = self.budget.path.row_mm;
+        if row.is_finite() {
+            section = bound_speed(section, row, self.settings.speed_of(self.machine, stroke.pen) * self.period())?;
+        }
         self.lift(stroke, start, vec![section]).ok()
     }
 

@@ -20,6 +20,7 @@ use drawing::{Line, Segment, Stroke};
 pub use blend::CornerBlend;
 pub use fit::{Aim, Limits, fitted};
 pub use piece::{Piece, Section};
+pub(crate) use slow_zones::bound_speed;
 use tangent::{direction_at, velocity};
 
 /// Distance below which a vertex counts as collinear with its neighbors, mm.
@@ -103,7 +104,7 @@ fn parametrise(curves: Vec<Segment>) -> Section {
         let (start, end) = (velocity(&curve, 0.0), velocity(&curve, 1.0));
         let rate = speed / start;
         speed = rate * end;
-        Piece { curve, rate, near_corner: false }
+        Piece { curve, rate, near_corner: false, row_bound: None }
     };
     curves.into_iter().map(piece).collect()
 }
@@ -156,7 +157,7 @@ mod tests {
         let sections = sections(&stroke, &EXACT);
         assert_eq!(sections.len(), 2);
         let line = Segment::Line(Line::new(Point::new(0.0, 0.0), Point::new(5.0, 0.0)));
-        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2, near_corner: false }]);
+        assert_eq!(sections[0], vec![Piece { curve: line, rate: 0.2, near_corner: false, row_bound: None }]);
     }
 
     #[test]

@@ -11,6 +11,9 @@ pub struct Piece {
     pub rate: f64,
     /// Whether rows on it deviate when the pen accelerates along it: in corners and near them.
     pub near_corner: bool,
+    /// On a piece of a fitted spline, `|p'|² k` with the largest curvature `k` within reach of a row,
+    /// 1/mm; 0 if rows are so close together that they need no such bound. `None` on all others.
+    pub row_bound: Option<f64>,
 }
 
 impl Piece {

@@ -240,6 +240,7 @@ impl Fit {
             curve: Segment::Cubic(self.spline.bezier(j)),
             rate: 1.0 / self.spline.span(j),
             near_corner: false,
+            row_bound: Some(0.0),
         };
         (0..self.count() - 1).map(piece).collect()
     }
