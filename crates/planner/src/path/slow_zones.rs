@@ -146,7 +146,12 @@ mod tests {
             Point::new(10.0, 0.1),
             Point::new(10.0, 0.3),
         );
-        let piece = |curve: Segment, length: f64| Piece { curve, rate: 1.0 / length, near_corner: false, row_bound: None };
+        let piece = |curve: Segment, length: f64| Piece {
+            curve,
+            rate: 1.0 / length,
+            near_corner: false,
+            row_bound: None,
+        };
         let section = vec![
             piece(line((0.0, 0.0), (9.7, 0.0)), 9.7),
             piece(Segment::Cubic(blend), 0.6),

@@ -170,7 +170,8 @@ impl Problem<'_> {
             }
             // Short steps mean that the path of minima is left: catch up before going on.
             if t > 0.2 || accepted.is_none() {
-                let factor = if t > 0.4 || accepted.is_none() { 0.5 } else { std::f64::consts::FRAC_1_SQRT_2 };
+                let factor =
+                    if t > 0.4 || accepted.is_none() { 0.5 } else { std::f64::consts::FRAC_1_SQRT_2 };
                 mu = (factor * mu).max(0.2 * LAST_WEIGHT * cost.time / constraints);
             }
         }
@@ -423,8 +424,7 @@ impl Local {
         let mut end = |index: usize, r: f64| {
             if r > 0.0 {
                 self.gradient[index] -= h / (square * r);
-                self.hessian[index][index] +=
-                    h / (2.0 * square * r * r * r) + h / (square * sum * r * r);
+                self.hessian[index][index] += h / (2.0 * square * r * r * r) + h / (square * sum * r * r);
             }
         };
         end(8, r0);

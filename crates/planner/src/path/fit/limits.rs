@@ -32,7 +32,8 @@ impl<'a> Limits<'a> {
             let ratio = motor.max_acceleration_ticks_s2 / motor.max_speed_ticks_s;
             ratio * ratio
         });
-        let mut limits = Self { machine, square_pen_speed: pen_mm_s * pen_mm_s, square_ratios, everywhere: None };
+        let mut limits =
+            Self { machine, square_pen_speed: pen_mm_s * pen_mm_s, square_ratios, everywhere: None };
         if machine.mechanism().is_linear() {
             limits.everywhere = limits.evaluate(machine.sheet().center());
         }

@@ -31,7 +31,12 @@ use std::ops::Range;
 
 use drawing::{Line, Point, Segment, Stroke, Vec2};
 
-use super::{clean, is_regular, piece::{Piece, Section}, simplify::simplify, tangent::distance};
+use super::{
+    clean, is_regular,
+    piece::{Piece, Section},
+    simplify::simplify,
+    tangent::distance,
+};
 pub use limits::Limits;
 use samples::Samples;
 use spline::Spline;

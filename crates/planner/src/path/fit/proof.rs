@@ -68,9 +68,8 @@ fn beyond(
         let along = line.p1 - line.p0;
         let length = along.hypot2().sqrt();
         let from_line = hull.iter().map(|p| (*p - line.p0).cross(along).abs() / length).fold(0.0, f64::max);
-        let is_near = |other: &Segment| {
-            matches!(other, Segment::Line(line) if most(&hull, line.p0, line.p1) <= radius)
-        };
+        let is_near =
+            |other: &Segment| matches!(other, Segment::Line(line) if most(&hull, line.p0, line.p1) <= radius);
         if from_line <= radius && near.iter().any(is_near) {
             return None;
         }

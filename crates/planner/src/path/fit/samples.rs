@@ -48,10 +48,11 @@ impl Samples {
     /// The larger side of the bounding box of all samples, mm.
     pub(super) fn extent(&self) -> f64 {
         let range = |of: fn(&Point) -> f64| {
-            let (low, high) = self.points.iter().map(of).fold(
-                (f64::INFINITY, f64::NEG_INFINITY),
-                |(low, high), x| (low.min(x), high.max(x)),
-            );
+            let (low, high) = self
+                .points
+                .iter()
+                .map(of)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
             high - low
         };
         range(|p| p.x).max(range(|p| p.y))

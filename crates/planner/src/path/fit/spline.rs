@@ -83,7 +83,8 @@ impl Spline {
         for i in 1..count - 1 {
             let [before, own, after] = self.value[i];
             // The first and last control points are known.
-            let (eliminated, known) = if i == 1 { (0.0, control[0]) } else { (factor[i - 1], control[i - 1]) };
+            let (eliminated, known) =
+                if i == 1 { (0.0, control[0]) } else { (factor[i - 1], control[i - 1]) };
             let pivot = own - before * eliminated;
             factor[i] = after / pivot;
             control[i] = (control[i] - before * known) / pivot;

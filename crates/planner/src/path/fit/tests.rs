@@ -13,7 +13,8 @@ fn farthest(from: &[Point], to: &[Point]) -> f64 {
     let nearest = |p: &Point| {
         let of = |w: &[Point]| {
             let (along, from) = (w[1] - w[0], *p - w[0]);
-            let t = if along.hypot2() > 0.0 { (from.dot(along) / along.hypot2()).clamp(0.0, 1.0) } else { 0.0 };
+            let t =
+                if along.hypot2() > 0.0 { (from.dot(along) / along.hypot2()).clamp(0.0, 1.0) } else { 0.0 };
             (from - t * along).hypot()
         };
         to.windows(2).map(of).fold(f64::INFINITY, f64::min)
@@ -102,8 +103,16 @@ fn fit_of_arcs_and_cubics_stays_within_tolerance() {
             let section = fitted(&stroke, &limits, tolerance, Aim::Fastest).expect("a spline");
             let path = chain(section.iter().map(|piece| piece.curve), 8);
             let drawn = chain(stroke.segments(), 400);
-            assert!(farthest(&path, &drawn) <= 1.01 * tolerance, "{} of {tolerance}", farthest(&path, &drawn));
-            assert!(farthest(&drawn, &path) <= 1.01 * tolerance, "{} of {tolerance}", farthest(&drawn, &path));
+            assert!(
+                farthest(&path, &drawn) <= 1.01 * tolerance,
+                "{} of {tolerance}",
+                farthest(&path, &drawn)
+            );
+            assert!(
+                farthest(&drawn, &path) <= 1.01 * tolerance,
+                "{} of {tolerance}",
+                farthest(&drawn, &path)
+            );
         }
     }
 }
