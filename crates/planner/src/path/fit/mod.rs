@@ -38,7 +38,7 @@ use super::{
     tangent::distance,
 };
 pub use limits::Limits;
-use samples::Samples;
+use samples::{GROWTH, SMOOTH_GROWTH, Samples};
 use spline::Spline;
 use tube::Energy;
 
@@ -96,7 +96,8 @@ pub fn fitted(stroke: &Stroke, limits: &Limits<'_>, tolerance: f64, aim: Aim) ->
         return None;
     }
     let radius = tolerance - (MERGE + SIMPLIFY) * tolerance - chord;
-    Fit::new(&pieces, radius, tolerance)?.run(limits, aim)
+    let growth = if aim == Aim::Fastest { GROWTH } else { SMOOTH_GROWTH };
+    Fit::new(Samples::of(&pieces, tolerance, growth), radius)?.run(limits, aim)
 }
 
 /// Removes vertices of sequences of lines that are within half of `least` of the last one kept; the
@@ -152,8 +153,7 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(pieces: &[Segment], radius: f64, tolerance: f64) -> Option<Self> {
-        let samples = Samples::of(pieces, tolerance);
+    fn new(samples: Samples, radius: f64) -> Option<Self> {
         if samples.points.windows(2).any(|pair| pair[0] == pair[1]) {
             return None;
         }
