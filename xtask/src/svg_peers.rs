@@ -36,11 +36,12 @@ pub(crate) fn run(folder: &Path) -> Result<bool> {
         match compare(&file) {
             Ok(row) => {
                 let part = if row.theirs > 0.0 { row.ours / row.theirs - 1.0 } else { 0.0 };
-                let is_off = row.off_mm > row.limit_mm;
+                let is_off = row.off_mm > row.limit_mm && row.same_page;
                 alike &= !is_off;
-                let remark = match (is_off, part.abs() > ALIKE_LENGTH) {
-                    (true, _) => "ink beside usvg's outlines",
-                    (_, true) => row.cause,
+                let remark = match (is_off, row.same_page, part.abs() > ALIKE_LENGTH) {
+                    (true, ..) => "ink beside usvg's outlines",
+                    (_, false, _) => "another size of the page: not compared",
+                    (_, _, true) => row.cause,
                     _ => "",
                 };
                 println!(
@@ -62,6 +63,8 @@ struct Row {
     theirs: f64,
     off_mm: f64,
     limit_mm: f64,
+    /// Whether both read the same size of the page; a width in percent is of nothing that is known.
+    same_page: bool,
     /// What the file has that only one side applies.
     cause: &'static str,
 }
@@ -86,8 +89,11 @@ fn compare(file: &Path) -> Result<Row> {
         (false, true) => "dashes, which usvg keeps apart",
         (false, false) => "other",
     };
+    let size = tree.size();
+    let their_page = [size.width(), size.height()].map(|px| f64::from(px) * 25.4 / 96.0);
+    let same_page = [width, height].iter().zip(their_page).all(|(a, b)| (a - b).abs() <= 0.01 + 1e-3 * b);
     let limit_mm = ALIKE_PER_MM * width.max(height).max(100.0);
-    Ok(Row { ours: ours.drawing.length(), theirs: length(&theirs.lines), off_mm, limit_mm, cause })
+    Ok(Row { ours: ours.drawing.length(), theirs: length(&theirs.lines), off_mm, limit_mm, same_page, cause })
 }
 
 /// The outlines of usvg's paths in mm, y up from the page's lower edge.
