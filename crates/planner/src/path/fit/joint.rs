@@ -179,7 +179,6 @@ impl Problem<'_> {
     }
 
     /// The time over the spans of a block, and the barrier; `None` if a constraint is violated.
-    #[expect(clippy::too_many_arguments, reason = "all of the problem")]
     fn cost(
         &self,
         spline: &Spline,
@@ -189,7 +188,7 @@ impl Problem<'_> {
         spans: &Range<usize>,
         places: &[[Place; 3]],
     ) -> Option<Cost> {
-        if block.clone().any(|i| !(b[i] > 0.0)) {
+        if block.clone().any(|i| b[i].is_nan() || b[i] <= 0.0) {
             return None;
         }
         let mut time = 0.0;
@@ -371,9 +370,7 @@ impl Quadratic {
         for p in 0..6 {
             self.gradient[p] += slope * by[p];
             let factor = curvature * by[p];
-            for q in 0..6 {
-                self.hessian[p][q] += factor * by[q];
-            }
+            self.hessian[p].iter_mut().zip(by).for_each(|(h, by)| *h += factor * by);
         }
     }
 }
@@ -388,6 +385,7 @@ struct Local {
 impl Local {
     /// Adds a function of S', S'', b and c, given how those depend on the unknowns: the weights of
     /// the control points and of b, and `1 / h` for c.
+    #[expect(clippy::needless_range_loop, reason = "columns of two matrices")]
     #[inline]
     fn add(&mut self, of: &Quadratic, [d1, d2]: &[[f64; 4]; 2], [w0, w1]: [f64; 2], rate: f64) {
         // The six rows of the Hessian times the derivatives by the unknowns.

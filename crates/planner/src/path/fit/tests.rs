@@ -45,7 +45,8 @@ fn strokes() -> impl Strategy<Value = Stroke> {
             let mut points = vec![at];
             for (way, length) in steps {
                 let angle = std::f64::consts::FRAC_PI_4 * f64::from(way);
-                at += 0.025 * f64::from(length).powi(2) * Vec2::new(libm::cos(angle), libm::sin(angle));
+                let length = f64::from(length);
+                at += 0.025 * length * length * Vec2::new(libm::cos(angle), libm::sin(angle));
                 points.push(at);
             }
             points
@@ -136,7 +137,7 @@ fn long_stroke_in_blocks_is_as_smooth_as_its_parts() {
     let section = fitted(&stroke, &limits, 0.02, Aim::Fastest).expect("a spline");
     let bends = section.iter().map(|piece| {
         let (first, second) = piece.curve.derivatives(0.0);
-        first.cross(second).abs() / first.hypot().powi(3)
+        first.cross(second).abs() / (first.hypot() * first.hypot2())
     });
     // The curvature of the wave is 0.75 / mm at most.
     let sharpest = bends.fold(0.0, f64::max);

@@ -204,7 +204,8 @@ fn newton(
     };
     let before = merit(0.0);
     let mut t = (SHORT_OF * longest).min(1.0);
-    while t > 1e-3 && !(merit(t) <= before) {
+    let is_worse = |merit: f64| merit.is_nan() || merit > before;
+    while t > 1e-3 && is_worse(merit(t)) {
         t *= 0.5;
     }
     if t > 1e-3 {
@@ -250,7 +251,7 @@ fn to_boundary(e: Vec2, x: Vec2, radius: f64) -> f64 {
 pub(super) fn sum_of_logs(numbers: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut product) = (0.0, 1.0);
     for number in numbers {
-        if !(number > 0.0) {
+        if number.is_nan() || number <= 0.0 {
             return f64::NAN;
         }
         product *= number;
