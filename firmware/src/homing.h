@@ -1,0 +1,14 @@
+/* Homing: for each move of the machine's list fast to the switch, back, slowly to the switch, back. */
+#ifndef PLOTPLAN_HOMING_H
+#define PLOTPLAN_HOMING_H
+
+#include <stdbool.h>
+
+/* Starts; false if the machine has no switches. */
+bool homing_start(void);
+bool homing_is_active(void);
+void homing_cancel(void);
+/* From the main loop. */
+void homing_poll(void);
+
+#endif

@@ -1,0 +1,234 @@
+/* Step and direction pins of two drivers: one interrupt of timer 1 at each step, of either motor. */
+#if defined(__AVR__)
+
+#include <stddef.h>
+
+#include "drive.h"
+#include "machine.h"
+#include "pen.h"
+#include "port_avr.h"
+#include "step_clock.h"
+
+/* Prepared pieces, a power of 2. */
+#define PIECES 8
+/* Motion starts when the queue is full, or this long after its last line. */
+#define START_DELAY_MS 200
+/* From the decision to start to the first event, half us. */
+#define START_LEAD 400
+/* If fewer counts than this are left after a compare register was written, the match may be missed. */
+#define MATCH_MARGIN 8
+
+static struct piece pieces[PIECES];
+static volatile uint8_t head, tail;
+static volatile bool running;
+/* Set if pieces ran out although the last one moved. */
+static volatile bool ran_dry;
+static volatile uint8_t pen_wanted;
+static uint8_t pen_set_to;
+static volatile int32_t at1, at2;
+static struct cutter cutter;
+/* `poll` drops what it prepared if this changed meanwhile. */
+static volatile uint8_t halts;
+static uint16_t line_ms;
+
+/* The interrupt's own. */
+static struct step_clock clock1, clock2;
+static uint16_t event, piece_end;
+static uint8_t backwards, reversed;
+static bool piece_moves;
+
+static void init(void) {
+    PIN_OUTPUT(PIN_STEP1);
+    PIN_OUTPUT(PIN_STEP2);
+    PIN_OUTPUT(PIN_DIR1);
+    PIN_OUTPUT(PIN_DIR2);
+    PIN_OUTPUT(PIN_Z_STEP);
+    PIN_OUTPUT(PIN_Z_DIR);
+    PIN_OUTPUT(PIN_ENABLE);
+    PIN_LOW(PIN_ENABLE);
+    PIN_INPUT_PULLUP(PIN_STEP_LIMIT1);
+    PIN_INPUT_PULLUP(PIN_STEP_LIMIT2);
+    reversed = (machine->motor[0].reversed ? 1 : 0) | (machine->motor[1].reversed ? 2 : 0);
+    TCCR1A = 0;
+    TCCR1B = _BV(CS11); /* half us */
+}
+
+/* Loads the next piece, which begins at `now`; false if there is none. */
+static inline bool load_piece(uint16_t now) {
+    if (tail == head) {
+        running = false;
+        ran_dry = piece_moves;
+        return false;
+    }
+    const struct piece *piece = &pieces[tail];
+    step_clock_load(&clock1, &piece->motor[0], now);
+    step_clock_load(&clock2, &piece->motor[1], now);
+    piece_end = now + piece->duration;
+    piece_moves = clock1.left || clock2.left;
+    backwards = piece->backwards;
+    pen_wanted = piece->pen;
+    uint8_t pins = backwards ^ reversed;
+    if (pins & 1) {
+        PIN_HIGH(PIN_DIR1);
+    } else {
+        PIN_LOW(PIN_DIR1);
+    }
+    if (pins & 2) {
+        PIN_HIGH(PIN_DIR2);
+    } else {
+        PIN_LOW(PIN_DIR2);
+    }
+    tail = (tail + 1) & (PIECES - 1);
+    return true;
+}
+
+static inline uint16_t time_to_next_event(uint16_t now) {
+    return step_clock_wait(&clock2, now, step_clock_wait(&clock1, now, piece_end - now));
+}
+
+ISR(TIMER1_COMPA_vect) {
+    uint16_t now = event;
+    /* The flag rises one count after the match, so a cleared flag may rise again. */
+    if ((int16_t)(TCNT1 - now) < 0) {
+        return;
+    }
+    for (;;) {
+        if (step_clock_is_due(&clock1, now)) {
+            PIN_HIGH(PIN_STEP1);
+            step_clock_advance(&clock1);
+            at1 += backwards & 1 ? -1 : 1;
+        }
+        if (step_clock_is_due(&clock2, now)) {
+            PIN_HIGH(PIN_STEP2);
+            step_clock_advance(&clock2);
+            at2 += backwards & 2 ? -1 : 1;
+        }
+        if (now == piece_end && !load_piece(now)) {
+            TIMSK1 = 0;
+            break;
+        }
+        uint16_t wait = time_to_next_event(now);
+        uint16_t next = now + wait;
+        OCR1A = next;
+        event = next;
+        if ((uint16_t)(TCNT1 - now) + MATCH_MARGIN < wait) {
+            break;
+        }
+        PIN_LOW(PIN_STEP1);
+        PIN_LOW(PIN_STEP2);
+        while ((uint16_t)(TCNT1 - now) < wait) {
+        }
+        now = next;
+        TIFR1 = _BV(OCF1A);
+    }
+    PIN_LOW(PIN_STEP1);
+    PIN_LOW(PIN_STEP2);
+}
+
+static void set_position(int32_t ticks1, int32_t ticks2) {
+    uint8_t state = port_lock();
+    at1 = ticks1;
+    at2 = ticks2;
+    port_unlock(state);
+}
+
+static void position(int32_t ticks[2]) {
+    uint8_t state = port_lock();
+    ticks[0] = at1;
+    ticks[1] = at2;
+    port_unlock(state);
+}
+
+static bool is_moving(void) {
+    return running || head != tail || !cutter_is_done(&cutter);
+}
+
+/* Prepares one piece; false if there is nothing to prepare or no room. */
+static bool prepare(void) {
+    uint8_t next = (head + 1) & (PIECES - 1), seen = halts;
+    if (next == tail) {
+        return false;
+    }
+    if (cutter_is_done(&cutter)) {
+        struct segment segment;
+        if (!queue_pop(&segment)) {
+            return false;
+        }
+        cutter_start(&cutter, &segment);
+        line_ms = machine_ms();
+    }
+    cutter_cut(&cutter, &pieces[head]);
+    uint8_t state = port_lock();
+    if (seen == halts) {
+        head = next;
+    } else {
+        cutter.left = 0;
+    }
+    port_unlock(state);
+    return true;
+}
+
+static void start(void) {
+    uint8_t state = port_lock();
+    if (head != tail) {
+        event = TCNT1 + START_LEAD;
+        running = load_piece(event);
+        event += time_to_next_event(event);
+        OCR1A = event;
+        TIFR1 = _BV(OCF1A);
+        TIMSK1 = _BV(OCIE1A);
+    }
+    port_unlock(state);
+}
+
+static void poll(void) {
+    if (ran_dry) {
+        ran_dry = false;
+        machine_count_late();
+    }
+    while (prepare()) {
+        if (running) {
+            break;
+        }
+    }
+    if (!running && head != tail
+        && (queue_is_full() || (uint16_t)(machine_ms() - line_ms) > START_DELAY_MS)) {
+        start();
+    }
+}
+
+/* The pen belongs to the start of a piece; a millisecond does not matter to it. */
+static void tick(void) {
+    uint8_t wanted = pen_wanted;
+    if (wanted != pen_set_to) {
+        pen_set_to = wanted;
+        pen_set(wanted);
+    }
+}
+
+static void halt(void) {
+    uint8_t state = port_lock();
+    TIMSK1 = 0;
+    running = false;
+    head = tail = 0;
+    cutter.left = 0;
+    piece_moves = false;
+    pen_wanted = 0;
+    halts++;
+    port_unlock(state);
+}
+
+const struct drive step_drive = {
+    .name = "step",
+    .init = init,
+    .set_position = set_position,
+    .position = position,
+    .is_moving = is_moving,
+    .poll = poll,
+    .tick = tick,
+    .halt = halt,
+    .measure = NULL,
+    .measures_position = false,
+};
+
+#endif
