@@ -7,6 +7,7 @@ use std::process::ExitCode;
 mod bench;
 mod ci;
 mod corpus;
+mod firmware;
 mod order;
 mod peers;
 mod svg_peers;
@@ -18,6 +19,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   tidy          check the dependency rules between crates, and tracked files
   corpus DIR    run the release binary on every drawing below DIR: no panic, no timeout, no plan
                 without a certificate
+  firmware [NAME …]
+                build the firmware, test it on the host and on an emulated ATmega328P; NAME selects
+                checks by a part of their name
   peers [DIR …] compare the interpretation of our drawings, and those below DIR, with hp2xx
                 (skipped if it is not installed): length and distance
   usvg DIR      compare the SVG importer with usvg on every SVG file in DIR: length and distance
@@ -42,6 +46,7 @@ fn main() -> ExitCode {
         ["tidy"] => tidy::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
         ["bench", "order", generator] => order::bench(generator.as_ref()),
+        ["firmware", ref filters @ ..] => firmware::run(filters),
         ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),
         ["usvg", folder] => svg_peers::run(folder.as_ref()),
         ["order", folder] => order::real(folder.as_ref()),

@@ -50,7 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "verify",
         ],
     ),
-    ("xtask", &["compiler", "drawing", "hpgl", "kinematics", "ordering", "plan", "planner"]),
+    ("xtask", &["compiler", "drawing", "hpgl", "kinematics", "ordering", "plan", "planner", "simulation"]),
 ];
 
 /// Any crate may use this one in its tests, and none outside of them.

@@ -739,6 +739,9 @@ pub(crate) enum Machine {
     Show {
         /// Name of a preset, or a machine file
         name: String,
+        /// Print the machine header of the firmware instead (docs/firmware.md)
+        #[arg(long, value_enum, value_name = "DRIVE", num_args = 0..=1, default_missing_value = "step")]
+        firmware_config: Option<FirmwareDrive>,
     },
     /// Check a machine file: validity, and reach of its sheet
     Check {
@@ -756,6 +759,27 @@ pub(crate) enum Machine {
         #[arg(short, long, value_enum)]
         format: Option<PictureFormat>,
     },
+}
+
+/// How the firmware moves the motors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FirmwareDrive {
+    /// Step and direction pins
+    Step,
+    /// DC motors with encoders
+    Dc,
+    /// RC servos
+    Servo,
+}
+
+impl std::fmt::Display for FirmwareDrive {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Step => "step",
+            Self::Dc => "dc",
+            Self::Servo => "servo",
+        })
+    }
 }
 
 #[derive(Debug, Args)]

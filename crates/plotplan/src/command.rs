@@ -4,6 +4,7 @@ mod check;
 mod convert;
 #[cfg(unix)]
 mod emulate;
+mod firmware_config;
 mod info;
 mod machine;
 mod preview;

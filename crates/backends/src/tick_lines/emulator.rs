@@ -163,6 +163,7 @@ impl TickLineReader {
     }
 
     fn follow(&mut self, line: &str) -> Result<(), &'static str> {
+        let line = line.split(';').next().unwrap_or_default().trim_end();
         let mut words = line.split(' ');
         let verb = words.next().unwrap_or_default();
         let numbers: Option<Vec<i64>> = words.map(|word| word.parse().ok()).collect();

@@ -32,13 +32,30 @@ pub(crate) fn unframed(line: &str) -> Option<&str> {
     (sum.parse() == Ok(checksum(text.as_bytes()))).then_some(text)
 }
 
+/// Longest name of a machine that is sent: with it a line stays within 70 bytes.
+const LONGEST_NAME: usize = 24;
+
 /// The framing of numbered tick lines.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct TickLineFraming;
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TickLineFraming {
+    /// `; machine NAME`, which a `begin` line carries: a firmware that knows its own name refuses the
+    /// plan of another machine, and any other reader ignores the comment.
+    comment: String,
+}
+
+impl TickLineFraming {
+    /// For plans of this machine. A name that might disturb a line is not sent.
+    pub(crate) fn for_machine(name: &str) -> Self {
+        let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+        let sent = !name.is_empty() && name.len() <= LONGEST_NAME && name.bytes().all(plain);
+        Self { comment: if sent { format!(" ; machine {name}") } else { String::new() } }
+    }
+}
 
 impl Framing for TickLineFraming {
     fn frame(&self, number: usize, text: &str) -> String {
-        let mut line = framed(&format!("{number}:{text}"));
+        let comment = if text.starts_with("begin ") { &self.comment } else { "" };
+        let mut line = framed(&format!("{number}:{text}{comment}"));
         line.push('\n');
         line
     }
@@ -104,8 +121,21 @@ mod tests {
     }
 
     #[test]
+    fn begin_line_names_the_machine() {
+        let line = |name: &str, text: &str| TickLineFraming::for_machine(name).frame(0, text);
+        let framed_line = |text: &str| framed(text) + "\n";
+        assert_eq!(line("coaxial", "begin 1 7 350000"), framed_line("0:begin 1 7 350000 ; machine coaxial"));
+        assert_eq!(line("coaxial", "s 0 0 800 0"), framed_line("0:s 0 0 800 0"));
+        for name in ["", "two words", "star*", "a-name-of-twenty-five-char"] {
+            assert_eq!(line(name, "begin 1 7 350000"), framed_line("0:begin 1 7 350000"), "{name}");
+        }
+        let longest = line("a-name-of-24-characters-", "begin 1 4294967295 4294967295");
+        assert!(longest.len() <= 70, "{} bytes", longest.len());
+    }
+
+    #[test]
     fn announced_room_is_parsed() {
-        let parsed = |text: &str| TickLineFraming.parse(&framed(text));
+        let parsed = |text: &str| TickLineFraming::default().parse(&framed(text));
         assert_eq!(parsed("ok 1 room 127"), Some(Reply::Next { number: 1, room: Some(127) }));
         assert_eq!(parsed("ok 1 room"), Some(Reply::Next { number: 1, room: None }));
         assert_eq!(parsed("ok 1"), Some(Reply::Next { number: 1, room: None }));

@@ -79,7 +79,8 @@ impl Backend for Answered {
     }
 
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
-        let framing = Box::new(framing::TickLineFraming);
+        let machine = program.table().map(|table| table.header.machine.clone()).unwrap_or_default();
+        let framing = Box::new(framing::TickLineFraming::for_machine(&machine));
         Some(Box::new(SlidingWindow::new(program, framing, options.window)))
     }
 

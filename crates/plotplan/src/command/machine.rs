@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use compiler::report::{Code, MachineReport, MachineSource};
 
+use super::firmware_config;
 use crate::cli::Machine;
 use crate::failure::Failure;
 use crate::machines;
@@ -12,7 +13,11 @@ use crate::{output, session, terminal};
 pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
     match arguments {
         Machine::List => output::report(&list()),
-        Machine::Show { name } => {
+        Machine::Show { name, firmware_config: Some(drive) } => {
+            let header = firmware_config::header(&machines::machine(name)?.machine, *drive)?;
+            output::write("-", |out| out.write_all(header.as_bytes()))
+        }
+        Machine::Show { name, firmware_config: None } => {
             // Only a machine that can be used is shown.
             machines::machine(name)?;
             let text = machines::machine_toml(name)?;
