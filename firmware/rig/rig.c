@@ -76,15 +76,31 @@ static void moved(void) {
     }
 }
 
+/* Drives an input pin from outside. simavr must be told twice: pull-ups that the program switches on
+ * would otherwise win over the level until it changes. */
+static uint8_t levels[26], masks[26];
+
+static void drive_pin(char port, int bit, int level) {
+    uint8_t *value = &levels[port - 'A'], *mask = &masks[port - 'A'];
+    if (*mask & 1 << bit && !(*value & 1 << bit) == !level) {
+        return;
+    }
+    *mask |= (uint8_t)(1 << bit);
+    *value = (uint8_t)((*value & ~(1 << bit)) | (level ? 1 << bit : 0));
+    avr_ioport_external_t external = {.name = (unsigned char)port, .mask = *mask, .value = *value};
+    avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &external);
+    avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit), level ? 1 : 0);
+}
+
 /* ---- switches ---- */
 static struct { int used, motor; long position; } by_position[5];
 static uint8_t forced;
-static avr_irq_t *switch_pin[5];
+static struct { char port; int bit; } switch_pin[5];
 
 static void set_switches(void) {
     for (int n = 1; n <= 4; n *= 2) {
         int closed = forced & n || (by_position[n].used && at[by_position[n].motor] <= by_position[n].position);
-        avr_raise_irq(switch_pin[n], !closed);
+        drive_pin(switch_pin[n].port, switch_pin[n].bit, !closed);
     }
 }
 
@@ -161,7 +177,6 @@ static struct { int used; double g, tau, stiction, friction; } dc;
 static double place[2], speed[2];
 static long counts[2];
 static int unplugged[2];
-static avr_irq_t *encoder_pin[4];
 #define PLANT_S 2e-4
 #define BAND 1.0
 
@@ -169,8 +184,8 @@ static void set_encoder(int m) {
     static const int gray[4] = {0, 1, 3, 2};
     if (!unplugged[m]) {
         int pins = gray[((counts[m] % 4) + 4) % 4];
-        avr_raise_irq(encoder_pin[2 * m], pins & 1);
-        avr_raise_irq(encoder_pin[2 * m + 1], pins >> 1);
+        drive_pin('C', 2 * m, pins & 1);
+        drive_pin('C', 2 * m + 1, pins >> 1);
     }
 }
 
@@ -268,14 +283,16 @@ static void open_port(const char *link) {
 }
 
 static void feed(avr_irq_t *receiver) {
-    static uint64_t next_byte;
-    if (pending_from == pending_to) {
+    static uint64_t next_byte, next_read;
+    if (pending_from == pending_to && avr->cycle >= next_read) {
+        next_read = avr->cycle + 1600;
         ssize_t got = read(master, pending, sizeof pending);
         pending_from = 0;
         pending_to = got > 0 ? (size_t)got : 0;
     }
     if (pending_from < pending_to && avr->cycle >= next_byte) {
-        avr_raise_irq(receiver, damage(pending[pending_from++], garble_in));
+        uint8_t byte = pending[pending_from++];
+        avr_raise_irq(receiver, damage(byte, garble_in));
         bytes_in++;
         next_byte = avr->cycle + BYTE_CYCLES;
     }
@@ -285,7 +302,7 @@ static void feed(avr_irq_t *receiver) {
 #define VECTORS 26
 static struct { uint64_t calls, cycles, longest; } vectors[VECTORS];
 static struct { int vector; uint16_t sp; uint64_t start, nested; } stack[8];
-static int depth;
+static int depth, resets;
 static uint64_t blocked_since, blocked_longest;
 static uint16_t deepest = UINT16_MAX;
 
@@ -293,7 +310,23 @@ static uint16_t stack_pointer(void) {
     return (uint16_t)(avr->data[R_SPL] | avr->data[R_SPH] << 8);
 }
 
+/* A reset forgets what drives the pins, and where timer 2 began. */
+static void after_reset(void) {
+    servo_base = 0;
+    depth = 0;
+    resets++;
+    memset(masks, 0, sizeof masks);
+    set_switches();
+    if (dc.used) {
+        set_encoder(0);
+        set_encoder(1);
+    }
+}
+
 static void before_instruction(void) {
+    if (avr->pc == 0) {
+        after_reset();
+    }
     /* A vector's jump is executed only when its interrupt is served. */
     if (avr->pc > 0 && avr->pc < VECTORS * 4 && avr->pc % 4 == 0 && depth < 8) {
         if (avr->pc == TICK_VECTOR * 4 && !servo_base) {
@@ -337,16 +370,13 @@ static void after_instruction(void) {
 
 /* ---- events ---- */
 static struct { double s; char what[16]; } events[16];
-static int event_count, events_done, resets;
+static int event_count, events_done;
 static uint32_t hang_at;
 
 static void do_event(const char *what) {
     fprintf(stderr, "rig: %s\n", what);
     if (!strcmp(what, "reset")) {
         avr_reset(avr);
-        servo_base = 0;
-        depth = 0;
-        resets++;
     } else if (!strcmp(what, "hang")) {
         avr->pc = hang_at;
     } else if (!strncmp(what, "unplug", 6)) {
@@ -455,11 +485,10 @@ int main(int argc, char **argv) {
     avr_irq_t *receiver = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_uart, NULL);
     if (dc.used) {
-        for (int i = 0; i < 4; i++) {
-            encoder_pin[i] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), i);
-        }
-        switch_pin[1] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), 2);
-        switch_pin[2] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), 3);
+        switch_pin[1].port = 'D';
+        switch_pin[1].bit = 2;
+        switch_pin[2].port = 'D';
+        switch_pin[2].bit = 3;
         for (int m = 0; m < 2; m++) {
             place[m] = (double)counts[m];
             set_encoder(m);
@@ -467,17 +496,19 @@ int main(int argc, char **argv) {
         avr_cycle_timer_register(avr, (avr_cycle_count_t)(PLANT_S * CYCLES_PER_S), plant, NULL);
     } else {
         avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_REG_PORT), on_port_d, NULL);
-        switch_pin[1] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 1);
-        switch_pin[2] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 2);
+        switch_pin[1].port = 'B';
+        switch_pin[1].bit = 1;
+        switch_pin[2].port = 'B';
+        switch_pin[2].bit = 2;
     }
-    switch_pin[4] = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 4);
+    switch_pin[4].port = 'B';
+    switch_pin[4].bit = 4;
     set_switches();
     open_port(link);
-    fprintf(stderr, "rig: ready\n");
 
     double start = wall();
     uint64_t next_look = 0, next_ms = 0;
-    int input_ended = 0;
+    int input_ended = 0, ready = 0;
     for (;;) {
         before_instruction();
         int state = avr_run(avr);
@@ -495,6 +526,10 @@ int main(int argc, char **argv) {
             continue;
         }
         next_ms = avr->cycle + MS_CYCLES;
+        if (!ready && avr->cycle > 20 * MS_CYCLES) {
+            ready = 1; /* the program listens */
+            fprintf(stderr, "rig: ready\n");
+        }
         double simulated = (double)avr->cycle / CYCLES_PER_S, ahead = simulated / pace - (wall() - start);
         if (ahead > 1e-3) {
             usleep((useconds_t)(ahead * 1e6));

@@ -311,6 +311,11 @@ static void poll(void) {
     }
 }
 
+static void get_friction(int16_t duty[2]) {
+    duty[0] = friction[0];
+    duty[1] = friction[1];
+}
+
 const struct drive dc_drive = {
     .name = "dc",
     .init = init,
@@ -321,6 +326,7 @@ const struct drive dc_drive = {
     .tick = tick,
     .halt = halt,
     .measure = measure,
+    .friction = get_friction,
     .measures_position = true,
 };
 

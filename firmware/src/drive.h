@@ -29,6 +29,8 @@ struct drive {
     void (*halt)(void);
     /* Measures friction and keeps it in EEPROM; NULL if there is nothing to measure. */
     void (*measure)(void);
+    /* The friction of both motors that is fed forward, duty in 1/800; NULL if none is. */
+    void (*friction)(int16_t duty[2]);
     /* Whether `position` is still right after `halt` in motion (encoders: yes, steps: no). */
     bool measures_position;
 };

@@ -32,7 +32,7 @@ static void enter(enum phase next, uint16_t units) {
 static void start_move(void) {
     const struct plotplan_homing *homing = current();
     if (switch_is_closed()) {
-        enter(CLEAR, homing->back_off);
+        enter(CLEAR, homing->longest);
     } else {
         enter(FAST, homing->longest);
     }
@@ -89,17 +89,33 @@ static bool is_at_rest(void) {
     return queue_is_empty() && !machine->drive->is_moving();
 }
 
+static void stop_and_enter(enum phase next, uint16_t units) {
+    machine_stop_here();
+    int32_t at[2];
+    machine->drive->position(at);
+    machine_set_position(at[0], at[1]);
+    enter(next, units);
+}
+
 static void search(uint16_t unit_us, enum phase next) {
     if (switch_is_closed()) {
-        machine_stop_here();
-        int32_t at[2];
-        machine->drive->position(at);
-        machine_set_position(at[0], at[1]);
-        enter(next, current()->back_off);
+        stop_and_enter(next, current()->back_off);
     } else if (units_left == 0 && is_at_rest()) {
         fail();
     } else if (queue_is_empty()) {
         push_units(1, unit_us);
+    }
+}
+
+/* Away from a switch that is closed at the start, slowly. */
+static void clear(void) {
+    const struct plotplan_homing *homing = current();
+    if (!switch_is_closed()) {
+        stop_and_enter(FAST, homing->longest);
+    } else if (units_left == 0 && is_at_rest()) {
+        fail();
+    } else if (queue_is_empty()) {
+        push_units(-1, homing->slow_us);
     }
 }
 
@@ -109,6 +125,8 @@ void homing_poll(void) {
     case IDLE:
         return;
     case CLEAR:
+        clear();
+        return;
     case BACK:
     case BACK_AGAIN:
         if (units_left > 0) {
@@ -118,8 +136,6 @@ void homing_poll(void) {
         } else if (is_at_rest()) {
             if (switch_is_closed()) {
                 fail();
-            } else if (phase == CLEAR) {
-                enter(FAST, homing->longest);
             } else if (phase == BACK) {
                 enter(SLOW, 2 * homing->back_off);
             } else {

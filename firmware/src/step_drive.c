@@ -9,6 +9,9 @@
 #include "port_avr.h"
 #include "step_clock.h"
 
+/* The interrupt's speed sets the largest step rate; the 300 bytes more are well spent. */
+#pragma GCC optimize("O2")
+
 /* Prepared pieces, a power of 2. */
 #define PIECES 8
 /* Motion starts when the queue is full, or this long after its last line. */
@@ -25,7 +28,8 @@ static volatile bool running;
 static volatile bool ran_dry;
 static volatile uint8_t pen_wanted;
 static uint8_t pen_set_to;
-static volatile int32_t at1, at2;
+/* Where the motors will be at the end of the piece: one addition a piece instead of one a step. */
+static volatile int32_t end1, end2;
 static struct cutter cutter;
 /* `poll` drops what it prepared if this changed meanwhile. */
 static volatile uint8_t halts;
@@ -66,6 +70,8 @@ static inline bool load_piece(uint16_t now) {
     piece_end = now + piece->duration;
     piece_moves = clock1.left || clock2.left;
     backwards = piece->backwards;
+    end1 += backwards & 1 ? -(int32_t)clock1.left : (int32_t)clock1.left;
+    end2 += backwards & 2 ? -(int32_t)clock2.left : (int32_t)clock2.left;
     pen_wanted = piece->pen;
     uint8_t pins = backwards ^ reversed;
     if (pins & 1) {
@@ -93,15 +99,18 @@ ISR(TIMER1_COMPA_vect) {
         return;
     }
     for (;;) {
-        if (step_clock_is_due(&clock1, now)) {
+        bool due1 = step_clock_is_due(&clock1, now), due2 = step_clock_is_due(&clock2, now);
+        if (due1) {
             PIN_HIGH(PIN_STEP1);
-            step_clock_advance(&clock1);
-            at1 += backwards & 1 ? -1 : 1;
         }
-        if (step_clock_is_due(&clock2, now)) {
+        if (due2) {
             PIN_HIGH(PIN_STEP2);
+        }
+        if (due1) {
+            step_clock_advance(&clock1);
+        }
+        if (due2) {
             step_clock_advance(&clock2);
-            at2 += backwards & 2 ? -1 : 1;
         }
         if (now == piece_end && !load_piece(now)) {
             TIMSK1 = 0;
@@ -127,15 +136,16 @@ ISR(TIMER1_COMPA_vect) {
 
 static void set_position(int32_t ticks1, int32_t ticks2) {
     uint8_t state = port_lock();
-    at1 = ticks1;
-    at2 = ticks2;
+    end1 = ticks1;
+    end2 = ticks2;
+    clock1.left = clock2.left = 0;
     port_unlock(state);
 }
 
 static void position(int32_t ticks[2]) {
     uint8_t state = port_lock();
-    ticks[0] = at1;
-    ticks[1] = at2;
+    ticks[0] = backwards & 1 ? end1 + clock1.left : end1 - clock1.left;
+    ticks[1] = backwards & 2 ? end2 + clock2.left : end2 - clock2.left;
     port_unlock(state);
 }
 
@@ -209,6 +219,9 @@ static void tick(void) {
 static void halt(void) {
     uint8_t state = port_lock();
     TIMSK1 = 0;
+    int32_t here[2];
+    position(here);
+    set_position(here[0], here[1]);
     running = false;
     head = tail = 0;
     cutter.left = 0;

@@ -9,7 +9,7 @@
 /* To the machine: `NUMBER:LINE*SUM`, or LINE alone; from it `ok NUMBER*SUM` and so on. SUM is the
  * exclusive or of the bytes before the asterisk. */
 enum state { AT_START, IN_NUMBER, IN_VERB, IN_FIELDS, IN_COMMENT, IN_SUM };
-enum owed { NOTHING, OK, ERROR, PLAIN_OK, PLAIN_ERROR, WHERE, STATUS, IDENTITY };
+enum owed { NOTHING, OK, ERROR, PLAIN_OK, PLAIN_ERROR, WHERE, STATUS, IDENTITY, FRICTION };
 
 /* A line names the machine that it was planned for in a comment: `begin ... ; machine NAME`. */
 static const IN_FLASH char MACHINE_COMMENT[] = "; machine ";
@@ -185,37 +185,36 @@ static bool verb_is(flash_text verb) {
     return *own == *verb;
 }
 
+/* Whether it is a line of a plan with the right number of fields. */
+static bool is_well_formed(void) {
+    if (line.bad) {
+        return false;
+    }
+    if (verb_is(TEXT("m")) || verb_is(TEXT("s"))) {
+        return line.fields == 4;
+    }
+    return (verb_is(TEXT("begin")) || verb_is(TEXT("end"))) && line.fields == 3;
+}
+
 /* Executes the line; NULL, or why it cannot be. */
 static reason execute(void) {
     const uint32_t *n = line.field;
-    if (line.bad) {
+    if (!is_well_formed()) {
         return TEXT("line");
     }
     if (verb_is(TEXT("m"))) {
-        if (line.fields != 4) {
-            return TEXT("fields");
-        }
         return line.wrapped ? TEXT("range") : machine_move(n[0], n[1], (int32_t)n[2], (int32_t)n[3]);
     }
     if (verb_is(TEXT("s"))) {
-        if (line.fields != 4) {
-            return TEXT("fields");
-        }
         return line.wrapped & 0xc ? TEXT("range") : machine_sync(n[0], n[1], (int32_t)n[2], (int32_t)n[3]);
     }
     if (verb_is(TEXT("begin"))) {
-        if (line.fields != 3) {
-            return TEXT("fields");
-        }
         if (n[0] != PLOTPLAN_TICK_LINES_VERSION) {
             return TEXT("version");
         }
         return names_other_machine() ? TEXT("machine") : machine_begin();
     }
-    if (verb_is(TEXT("end"))) {
-        return line.fields != 3 ? TEXT("fields") : machine_end(n[0], n[1], n[2]);
-    }
-    return TEXT("line");
+    return machine_end(n[0], n[1], n[2]);
 }
 
 /* Lines outside of a plan: `where*SUM`. False if it is none of them. */
@@ -231,6 +230,10 @@ static bool execute_command(void) {
     }
     if (verb_is(TEXT("machine"))) {
         owed = IDENTITY;
+        return true;
+    }
+    if (verb_is(TEXT("friction")) && machine->drive->friction) {
+        owed = FRICTION;
         return true;
     }
     if (verb_is(TEXT("home"))) {
@@ -251,6 +254,10 @@ static void numbered_line(void) {
     owed = OK;
     /* Damaged, or not the one expected: the answer says which is. Line 0 starts again. */
     if (line.state != IN_SUM || (line.number != 0 && line.number != expected)) {
+        return;
+    }
+    /* A line that is not one, although its sum is right: damaged twice. */
+    if (!is_well_formed()) {
         return;
     }
     why = execute();
@@ -377,6 +384,14 @@ uint8_t tick_lines_answer(char answer[ANSWER_BYTES]) {
         *to++ = ' ';
         to = put_unsigned(to, PLOTPLAN_TICK_LINES_VERSION);
         break;
+    case FRICTION: {
+        int16_t duty[2];
+        machine->drive->friction(duty);
+        to = put_signed(put(to, TEXT("friction ")), duty[0]);
+        *to++ = ' ';
+        to = put_signed(to, duty[1]);
+        break;
+    }
     case PLAIN_ERROR:
         to = put(put(to, TEXT("error ")), why);
         summed = false;

@@ -40,6 +40,7 @@ const STEPS: &[Step] = &[
     }),
     step("corpus", "every drawing of ../shared/corpus, where it exists", corpus),
     step("fuzz", "one minute of fuzzing; installs nightly and cargo-fuzz if missing", fuzz),
+    on_request("firmware", "the firmware on an emulated ATmega328P; installs Debian packages", firmware),
     on_request("verify-package", "every crate builds from its package", || {
         cargo("package --workspace --locked --allow-dirty")
     }),
@@ -149,6 +150,11 @@ fn test() -> Result<()> {
 
 fn tidy() -> Result<()> {
     ensure!(crate::tidy::run()?, "see the complaints above");
+    Ok(())
+}
+
+fn firmware() -> Result<()> {
+    ensure!(crate::firmware::run(&[])?, "see the checks above");
     Ok(())
 }
 

@@ -1,5 +1,165 @@
-//! The image for DC motors.
+//! The image for DC motors: the loop closed by simulated motors, the ink measured.
+//!
+//! The rig's motors have the equations of the crate `simulation`; its prediction is the bound.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result, ensure};
+use kinematics::Machine;
+use simulation::plant::DcParameters;
+use simulation::{
+    AntiWindup, Drive, FeedForward, Feedback, InkRecorder, Job, MotorPlant, PidGains, Sample, Target,
+    simulate,
+};
 
 use super::Bench;
+use super::rig::Rig;
+use super::trace::{Steps, Trace};
 
-pub(super) fn run(_bench: &mut Bench) {}
+const IMAGE: &str = "uno-dc";
+/// Ticks/s per percent of duty, s, stiction and friction in percent, as `app/dc.h` assumes.
+const MOTOR: [f64; 4] = [106.67, 0.12, 8.0, 6.0];
+/// The gains of `app/dc.h`: % per tick, % per tick and s.
+const GAINS: [f64; 2] = [1.5, 2.0];
+/// The firmware's loop: fixed point, 1 ms.
+const PERIOD_S: f64 = 1e-3;
+/// What the ink may exceed the prediction by.
+const MARGIN: f64 = 1.1;
+/// Time between samples of the ink, us, as in the simulation.
+const SAMPLE_US: f64 = 2000.0;
+const PEN_DOWN_US: f64 = 1500.0;
+const PEN_UP_US: f64 = 1000.0;
+/// The error is too large for 20 ms, after the motor has moved away by 40 counts.
+const FOLLOW_S: f64 = 1.0;
+
+pub(super) fn run(bench: &mut Bench) {
+    bench.check("DC motors draw zot as predicted", drawn_as_predicted);
+    bench.check("friction measured at set-up", friction_measured);
+    bench.check("encoder unplugged", unplugged);
+}
+
+fn rig(bench: &Bench, motor: [f64; 4], start: [i64; 2], more: &[&str]) -> Result<Rig> {
+    let motor = motor.map(|value| value.to_string()).join(",");
+    let start = format!("{},{}", start[0], start[1]);
+    let mut options = vec!["--dc", &motor, "--start", &start];
+    options.extend(more);
+    Rig::start(bench, IMAGE, &options)
+}
+
+/// A plan with what it was made from.
+struct Drawn {
+    machine: Machine,
+    target: Target,
+    table: plan::TickTable,
+}
+
+fn drawn(drawing: &Path, plan: &Path) -> Result<Drawn> {
+    let preset = compiler::machine_file::PRESETS.iter().find(|preset| preset.name == "coaxial");
+    let file = compiler::machine_file::MachineFile::parse(preset.context("no preset")?.toml)?;
+    let table = plan::file::read(&std::fs::read(plan)?)?.table;
+    let document = hpgl::read(&std::fs::read(drawing)?, &hpgl::Options::default());
+    let mut placed = document.pages.first().context("no page")?.drawing.clone();
+    placed.transform(drawing::Affine::new(table.header.placement));
+    Ok(Drawn { machine: file.machine()?, target: Target::new(&placed), table })
+}
+
+/// RMS of the distance of the ink from the drawing, as `simulate` predicts it, mm.
+fn predicted(drawn: &Drawn) -> Result<f64> {
+    let [g, tau, stiction, friction] = MOTOR;
+    let plant = MotorPlant::Dc(DcParameters::first_order(g, tau).with_friction(stiction, friction));
+    let gains = PidGains { kp: GAINS[0], ki: GAINS[1], ..PidGains::default() };
+    let drive = Drive {
+        feedback: Feedback::Pid(gains, AntiWindup::default()),
+        feed_forward: FeedForward { speed: 1.0, acceleration: 1.0, friction: 1.0 },
+        ..Drive::proportional(plant, GAINS[0], PERIOD_S)
+    };
+    let job = Job {
+        machine: &drawn.machine,
+        rows: &drawn.table.rows,
+        period_us: drawn.table.header.period_us,
+        vertices: &[],
+    };
+    let mut ink = InkRecorder::new(&drawn.machine);
+    simulate(&job, &drive, |sample| ink.observe(sample))?;
+    Ok(ink.compare(&drawn.target).stray.rms_mm)
+}
+
+/// The same of what the rig's pen did.
+fn measured(drawn: &Drawn, trace: &Trace) -> f64 {
+    let mut ink = InkRecorder::new(&drawn.machine);
+    let mut pens = trace.pens.iter().peekable();
+    let (mut pen, mut next) = (0, 0.0);
+    for &(time, ticks) in &trace.positions {
+        while let Some((_, us)) = pens.next_if(|change| change.0 <= time) {
+            pen = u16::from((us - PEN_DOWN_US).abs() < 4.0);
+        }
+        if time >= next {
+            next = time + SAMPLE_US;
+            ink.observe(&Sample { t_us: time as u64, pen, ticks, planned: ticks, commands: [0.0; 2] });
+        }
+    }
+    ink.compare(&drawn.target).stray.rms_mm
+}
+
+/// Lets a machine with these motors draw; RMS of its ink, mm, and what the interrupts cost.
+fn draw(bench: &Bench, motor: [f64; 4], measure: bool) -> Result<(f64, f64, String)> {
+    let example = bench.example("zot.hpgl");
+    let plan = bench.plan(&example, &[])?;
+    let steps = Steps::read(&plan)?;
+    let drawn = drawn(&example, &plan)?;
+    let rig = rig(bench, motor, steps.start, &[])?;
+    let mut remark = String::new();
+    if measure {
+        let answer = rig.ask("measure")?;
+        ensure!(answer == "ok", "measure: {answer}");
+        rig.ask_until("status", |answer| answer.contains(" idle "))?;
+        remark = rig.ask("friction")?;
+    }
+    rig.draw(bench, &plan)?;
+    let [a, b] = steps.end;
+    rig.ask_until("where", |answer| answer == format!("at {a} {b} 0"))?;
+    let (summary, trace) = rig.finish()?;
+    ensure!(trace.pen_changes(PEN_DOWN_US) == steps.pens, "the pen: {:?}", trace.pens);
+    if remark.is_empty() {
+        remark = summary.load();
+    }
+    Ok((measured(&drawn, &trace), predicted(&drawn)?, remark))
+}
+
+fn drawn_as_predicted(bench: &Bench) -> Result<String> {
+    let (ink, bound, load) = draw(bench, MOTOR, false)?;
+    ensure!(ink <= bound * MARGIN, "{ink:.3} mm RMS, predicted {bound:.3}");
+    Ok(format!("{ink:.3} mm RMS from the drawing, {bound:.3} predicted\n      {load}"))
+}
+
+/// Motors with another friction than the header says: measuring it must pay.
+fn friction_measured(bench: &Bench) -> Result<String> {
+    let [g, tau, ..] = MOTOR;
+    let stiff = [g, tau, 12.0, 9.0];
+    let (before, ..) = draw(bench, stiff, false)?;
+    let (after, bound, found) = draw(bench, stiff, true)?;
+    ensure!(after < 0.5 * before, "{after:.3} mm RMS after {before:.3}; {found}");
+    ensure!(after <= 1.5 * bound, "{after:.3} mm RMS, with 6 % {bound:.3}");
+    Ok(format!(
+        "9 % friction instead of 6 %: {before:.3} mm RMS, after `measure` {after:.3}; `{found}` of 800"
+    ))
+}
+
+fn unplugged(bench: &Bench) -> Result<String> {
+    let plan = bench.plan(&bench.example("zot.hpgl"), &[])?;
+    let steps = Steps::read(&plan)?;
+    let rig = rig(bench, MOTOR, steps.start, &["--at", "3.0,unplug2"])?;
+    let output = rig.send(bench, &plan, &[])?;
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    ensure!(!output.status.success() && message.contains("follow"), "send: {message}");
+    let (place, status) = (rig.ask("where")?, rig.ask("status")?);
+    ensure!(place == "at unknown" && status.contains("follow"), "{place}, {status}");
+    let (summary, trace) = rig.finish()?;
+    ensure!(summary.pair("duty") == [0.0; 2], "duty {:?}", summary.pair("duty"));
+    let pen = trace.pens.last().context("no pen")?;
+    ensure!((pen.1 - PEN_UP_US).abs() < 4.0, "the pen is at {} us", pen.1);
+    let first = trace.positions.iter().find(|at| at.1 != trace.positions[0].1).context("no motion")?.0;
+    let stopped = (pen.0 - first) * 1e-6 - 3.0;
+    ensure!(stopped < FOLLOW_S, "stopped after {stopped:.2} s");
+    Ok(format!("`error follow` {:.0} ms later, motors off, pen up", 1e3 * stopped))
+}

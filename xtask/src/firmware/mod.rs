@@ -1,6 +1,7 @@
 //! `cargo xtask firmware`: builds the firmware, tests its layers on the host, and lets the real
 //! `plotplan send` draw on an emulated ATmega328P.
 
+mod arduino;
 mod dc;
 mod rig;
 mod steppers;
@@ -17,6 +18,7 @@ const PACKAGES: &[(&str, &str)] = &[
     ("gcc-avr", "/usr/bin/avr-gcc"),
     ("avr-libc", "/usr/lib/avr/include/avr/io.h"),
     ("libelf-dev", "/usr/include/libelf.h"),
+    ("arduino-core-avr", "/usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h"),
     ("libsimavr-dev", "/usr/include/simavr/sim_avr.h"),
 ];
 
@@ -77,24 +79,39 @@ impl Bench {
 pub(crate) fn run(filters: &[&str]) -> Result<bool> {
     install()?;
     let firmware = crate::top().join("firmware");
-    execute(Command::new("cargo").args(["build", "--quiet", "--locked", "-p", "plotplan"]))?;
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| crate::top().join("target"), PathBuf::from);
     let mut bench = Bench {
         folder: tempfile::tempdir().context("no temporary folder")?,
         firmware,
-        plotplan: target.join("debug/plotplan").canonicalize().context("plotplan was not built")?,
+        plotplan: program()?,
         filters: filters.iter().map(|&filter| filter.to_owned()).collect(),
         passed: 0,
         failed: 0,
     };
     bench.check("headers of all presets compile", headers);
-    bench.check("images keep their budgets, without heap and floating point", |bench| make(bench, &["all", "rig"]));
+    bench.check("images keep their budgets, without heap and floating point", |bench| {
+        make(bench, &["all", "rig"])
+    });
     bench.check("portable layers on the host, sanitizers", |bench| make(bench, &["test"]));
-    ensure!(bench.image("../rig").with_extension("").is_file() || make(&bench, &["all", "rig"]).is_ok(), "no rig");
+    ensure!(
+        bench.image("../rig").with_extension("").is_file() || make(&bench, &["all", "rig"]).is_ok(),
+        "no rig"
+    );
+    bench.check("Arduino examples compile", arduino::examples);
     steppers::run(&mut bench);
     dc::run(&mut bench);
     println!("{} passed, {} failed", bench.passed, bench.failed);
     Ok(bench.failed == 0)
+}
+
+/// The program that sends: the one that the variable PLOTPLAN names, otherwise built here.
+fn program() -> Result<PathBuf> {
+    if let Some(program) = std::env::var_os("PLOTPLAN") {
+        return Path::new(&program).canonicalize().context("PLOTPLAN");
+    }
+    execute(Command::new("cargo").args(["build", "--quiet", "--locked", "-p", "plotplan"]))?;
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| crate::top().join("target"), PathBuf::from);
+    target.join("debug/plotplan").canonicalize().context("plotplan was not built")
 }
 
 /// Installs the packages that are missing.
@@ -104,7 +121,8 @@ fn install() -> Result<()> {
     if names.is_empty() {
         return Ok(());
     }
-    execute(Command::new("apt-get").args(["update", "-qq"])).context("the firmware's tests need Debian packages")?;
+    execute(Command::new("apt-get").args(["update", "-qq"]))
+        .context("the firmware's tests need Debian packages")?;
     execute(Command::new("apt-get").args(["install", "-y", "-qq"]).args(&names))?;
     if let Some((name, file)) = PACKAGES.iter().find(missing) {
         bail!("{name} is installed, but {file} is missing");
@@ -113,7 +131,8 @@ fn install() -> Result<()> {
 }
 
 fn execute(command: &mut Command) -> Result<()> {
-    let status = command.current_dir(crate::top()).status().with_context(|| format!("cannot run {command:?}"))?;
+    let status =
+        command.current_dir(crate::top()).status().with_context(|| format!("cannot run {command:?}"))?;
     ensure!(status.success(), "{command:?}: {status}");
     Ok(())
 }
@@ -123,7 +142,8 @@ fn make(bench: &Bench, targets: &[&str]) -> Result<String> {
     let output = Command::new("make").arg("-C").arg(&bench.firmware).args(targets).output()?;
     let text = String::from_utf8_lossy(&output.stdout);
     ensure!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
-    let told = |line: &&str| line.contains(" bytes, RAM") || line.contains("counts RMS") || line.contains("passed");
+    let told =
+        |line: &&str| line.contains(" bytes, RAM") || line.contains("counts RMS") || line.contains("passed");
     let lines: Vec<&str> = text.lines().filter(told).map(str::trim).collect();
     Ok(if lines.is_empty() { "up to date".to_owned() } else { format!("\n      {}", lines.join("\n      ")) })
 }

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -17,6 +17,10 @@ pub(super) const CYCLES_PER_US: f64 = 16.0;
 /// Vectors of an ATmega328P.
 const VECTORS: &[(&str, &str)] =
     &[("5", "encoders"), ("4", "encoders"), ("8", "millisecond"), ("11", "steps"), ("18", "receive")];
+/// Of open(2) on Linux.
+const O_NONBLOCK: i32 = 0o4000;
+/// An answer takes a few milliseconds, and more on a busy machine.
+const ANSWER_LIMIT: Duration = Duration::from_secs(20);
 /// A sender that takes longer hangs.
 const SEND_LIMIT: Duration = Duration::from_secs(600);
 
@@ -44,7 +48,11 @@ impl Summary {
             {
                 parts.insert(
                     *name,
-                    format!("{name} {:.2} % ({:.0} cycles, {longest} most)", 100.0 * sum / cycles, sum / calls),
+                    format!(
+                        "{name} {:.2} % ({:.0} cycles, {longest} most)",
+                        100.0 * sum / cycles,
+                        sum / calls
+                    ),
                 );
             }
         }
@@ -127,20 +135,33 @@ impl Rig {
 
     /// Sends a line with its checksum and returns the answer without its own.
     pub(super) fn ask(&self, text: &str) -> Result<String> {
-        let mut port = std::fs::OpenOptions::new().read(true).write(true).open(&self.link)?;
+        let mut port =
+            std::fs::OpenOptions::new().read(true).write(true).custom_flags(O_NONBLOCK).open(&self.link)?;
         let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
         port.write_all(format!("{text}*{sum}\n").as_bytes())?;
-        let (sender, answers) = channel();
-        std::thread::spawn(move || {
-            let mut line = Vec::new();
-            let mut byte = [0];
-            while port.read_exact(&mut byte).is_ok() && byte[0] != b'\n' {
-                line.push(byte[0]);
+        // Answers to a sender that has ended may still come.
+        let kind = match text {
+            "where" => "at ",
+            "status" | "friction" => text,
+            _ => "",
+        };
+        let start = Instant::now();
+        let (mut line, mut byte) = (Vec::new(), [0]);
+        while start.elapsed() < ANSWER_LIMIT {
+            match port.read(&mut byte) {
+                Ok(1) if byte[0] == b'\n' => {
+                    let answer = String::from_utf8_lossy(&line).into_owned();
+                    if answer.starts_with(kind) {
+                        return Ok(answer.split('*').next().unwrap_or_default().to_owned());
+                    }
+                    line.clear();
+                }
+                Ok(1) => line.push(byte[0]),
+                Err(error) if error.kind() != std::io::ErrorKind::WouldBlock => return Err(error.into()),
+                _ => std::thread::sleep(Duration::from_millis(2)),
             }
-            let _ = sender.send(String::from_utf8_lossy(&line).into_owned());
-        });
-        let answer = receive(&answers, text)?;
-        Ok(answer.split('*').next().unwrap_or_default().to_owned())
+        }
+        bail!("no answer to {text}")
     }
 
     /// Asks until the answer is as wanted.
@@ -173,10 +194,6 @@ impl Drop for Rig {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-fn receive(answers: &Receiver<String>, text: &str) -> Result<String> {
-    answers.recv_timeout(Duration::from_secs(10)).with_context(|| format!("no answer to {text}"))
 }
 
 /// Waits for a sender; kills one that hangs.

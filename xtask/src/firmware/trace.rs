@@ -120,9 +120,28 @@ impl Trace {
     }
 }
 
-/// Compares every step with the plan: number, direction, time. Returns the spread of times, us: late
-/// steps relative to the earliest.
-pub(super) fn compare(plan: &Steps, trace: &Trace) -> Result<f64> {
+/// How early and how late steps are, us, relative to the median: a constant delay moves the whole
+/// drawing in time only.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Jitter {
+    pub(super) early_us: f64,
+    pub(super) late_us: f64,
+}
+
+impl std::fmt::Display for Jitter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "-{:.1} to +{:.1} us", self.early_us, self.late_us)
+    }
+}
+
+impl Jitter {
+    pub(super) fn most(&self) -> f64 {
+        self.early_us.max(self.late_us)
+    }
+}
+
+/// Compares every step with the plan: number, direction, time.
+pub(super) fn compare(plan: &Steps, trace: &Trace) -> Result<Jitter> {
     let mut late = Vec::new();
     for motor in 0..2 {
         let (wanted, made) = (&plan.motors[motor], &trace.motors[motor]);
@@ -132,8 +151,10 @@ pub(super) fn compare(plan: &Steps, trace: &Trace) -> Result<f64> {
             late.push(made.0 - wanted.0);
         }
     }
-    let most = late.iter().copied().fold(f64::MIN, f64::max);
-    Ok(most - late.iter().copied().fold(f64::MAX, f64::min))
+    late.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (late.first(), late.last()) else { return Ok(Jitter::default()) };
+    let median = late[late.len() / 2];
+    Ok(Jitter { early_us: median - first, late_us: last - median })
 }
 
 /// Only number and direction: where the queue may have run empty.

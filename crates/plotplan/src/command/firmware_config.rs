@@ -56,12 +56,11 @@ pub(super) fn header(machine: &Machine, drive: FirmwareDrive) -> Result<String, 
         let shortest = (1e6 / (motor.max_speed_ticks_s * SPEED_MARGIN)).floor().clamp(1.0, 65_535.0);
         let _ = write!(
             text,
-            "        {{ /* {}: {:.3} ticks per {}, at most {:.1} ticks/s */\n            \
+            "        {{ /* {}: {:.3} ticks per rad or mm, at most {:.1} ticks/s */\n            \
              /* .shortest_tick_us */ {shortest}, /* .reversed, .encoder_reversed */ false, false,\n            \
              /* .lowest, .highest */ {lowest}, {highest},\n            /* .loop */ {}, /* .servo */ {},\n        }},\n",
             motor.name.replace("*/", ""),
             motor.ticks_per_unit,
-            "unit of its joint (rad or mm)",
             motor.max_speed_ticks_s,
             "{3072, 262, 3840, 1440, 48, 40}",
             "{1500, 256}",
