@@ -739,9 +739,11 @@ pub(crate) enum Machine {
     Show {
         /// Name of a preset, or a machine file
         name: String,
-        /// Print the machine header of the firmware instead (docs/firmware.md)
-        #[arg(long, value_enum, value_name = "DRIVE", num_args = 0..=1, default_missing_value = "step")]
-        firmware_config: Option<FirmwareDrive>,
+        /// Print the machine header of the firmware instead, for this drive [default: as `[drive]` of
+        /// the machine says, else step]
+        #[arg(long, value_enum, value_name = "DRIVE", num_args = 0..=1)]
+        #[expect(clippy::option_option, reason = "the option, and its value")]
+        firmware_config: Option<Option<FirmwareDrive>>,
     },
     /// Check a machine file: validity, and reach of its sheet
     Check {

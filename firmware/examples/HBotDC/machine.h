@@ -13,12 +13,12 @@ static const struct plotplan_machine plotplan_machine = {
         { /* L: 12.400 ticks per rad or mm, at most 1240.0 ticks/s */
             /* .shortest_tick_us */ 790, /* .reversed, .encoder_reversed */ false, false,
             /* .lowest, .highest */ -6200, 12400,
-            /* .loop */ {3072, 262, 3840, 1440, 48, 40}, /* .servo */ {1500, 256},
+            /* .loop */ {3072, 262, 14317, 2684, 64, 40}, /* .servo */ {1500, 256},
         },
         { /* R: 12.400 ticks per rad or mm, at most 1240.0 ticks/s */
             /* .shortest_tick_us */ 790, /* .reversed, .encoder_reversed */ false, false,
             /* .lowest, .highest */ -6200, 12400,
-            /* .loop */ {3072, 262, 3840, 1440, 48, 40}, /* .servo */ {1500, 256},
+            /* .loop */ {3072, 262, 14317, 2684, 64, 40}, /* .servo */ {1500, 256},
         },
     },
     /* .pen: kind, up, down (us) */ {PEN_SERVO, 1000, 1500},

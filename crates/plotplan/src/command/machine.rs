@@ -14,7 +14,7 @@ pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
     match arguments {
         Machine::List => output::report(&list()),
         Machine::Show { name, firmware_config: Some(drive) } => {
-            let header = firmware_config::header(&machines::machine(name)?.machine, *drive)?;
+            let header = firmware_config::header(&machines::machine(name)?, *drive)?;
             output::write("-", |out| out.write_all(header.as_bytes()))
         }
         Machine::Show { name, firmware_config: None } => {
