@@ -22,6 +22,8 @@
 #define MEASURE_MOVED 3
 #define MEASURE_STOPPED_MS 150
 #define MEASURE_LARGEST (DUTY_LARGEST / 2)
+/* The way back, a few hundred counts at most. */
+#define RETURN_US 2000000UL
 
 static volatile int16_t count1, count2; /* encoders, modulo 2^16 */
 static uint8_t encoder_pins;
@@ -43,6 +45,7 @@ static struct {
     int16_t start_count, last_count;
     uint16_t still_ms;
     int16_t found[2];
+    int32_t from[2];
 } measuring;
 
 /* Channel A leads forwards. Old pins of one encoder (bits 0, 1) and new ones (bits 2, 3): counts. A jump over two counts is none. */
@@ -268,6 +271,8 @@ static void measure(void) {
     measuring.motor = 0;
     measuring.backwards = false;
     measuring.found[0] = measuring.found[1] = 0;
+    measuring.from[0] = at[0];
+    measuring.from[1] = at[1];
     next_measurement();
     drive_outputs();
     port_unlock(state);
@@ -302,13 +307,13 @@ static void poll(void) {
     }
     release();
     port_store_friction(friction);
-    bool was_engaged = engaged;
+    /* Back to where it began, under the loop: a pose that was set by hand stays. */
+    int32_t here[2];
+    position(here);
+    int32_t back1 = measuring.from[0] - here[0], back2 = measuring.from[1] - here[1];
     measuring.phase = MEASURE_NOT;
-    if (was_engaged) {
-        int32_t here[2];
-        position(here);
-        machine_set_position(here[0], here[1]);
-    }
+    set_position(here[0], here[1]);
+    queue_push((int16_t)back1, (int16_t)back2, RETURN_US, 0);
 }
 
 static void get_friction(int16_t duty[2]) {

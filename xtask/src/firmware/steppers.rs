@@ -16,6 +16,9 @@ const PEN_DOWN_US: f64 = 1500.0;
 const PEN_UP_US: f64 = 1000.0;
 /// Steps may be this far from their time.
 const STEP_BOUND_US: f64 = 16.0;
+/// In rows of random speeds at the limit, up to three events can fall into the time that one takes. Two
+/// steps of a motor stay apart: they are due 50 us after each other.
+const CROWDED_BOUND_US: f64 = 32.0;
 /// A switch stops the motors within two samples and a step.
 const STOP_BOUND_US: f64 = 3000.0;
 /// A resumed plan may leave a line in between two ticks of the original.
@@ -135,7 +138,7 @@ fn random_plans(bench: &Bench) -> Result<String> {
         worst.early_us = worst.early_us.max(jitter.early_us);
         worst.late_us = worst.late_us.max(jitter.late_us);
     }
-    ensure!(worst.most() <= STEP_BOUND_US, "steps at {worst}");
+    ensure!(worst.most() <= CROWDED_BOUND_US, "steps at {worst}");
     Ok(format!("{count} steps, none lost or gained, each at its time {worst}"))
 }
 
