@@ -48,7 +48,8 @@ static struct {
     int32_t from[2];
 } measuring;
 
-/* Channel A leads forwards. Old pins of one encoder (bits 0, 1) and new ones (bits 2, 3): counts. A jump over two counts is none. */
+/* Old pins of one encoder (bits 0, 1) and new ones (bits 2, 3): counts. Channel A leads forwards. A
+ * jump over two counts is none. */
 static const IN_FLASH int8_t quadrature[16] = {0, -1, 1, 0, 1, 0, 0, -1, -1, 0, 0, 1, 0, 1, -1, 0};
 
 ISR(ENCODER_VECTOR) {
