@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use super::{Bench, execute};
 
 const CORE: &str = "/usr/share/arduino/hardware/arduino/avr";
-/// The core is written for avr-gcc 7, whose float.h has DECIMAL_DIG in C++; Debian's has version 5.
+/// The core is written for avr-gcc 7, whose float.h has `DECIMAL_DIG` in C++; Debian's has version 5.
 const FLAGS: &[&str] = &[
     "-mmcu=atmega328p",
     "-DF_CPU=16000000L",

@@ -1,5 +1,5 @@
 //! `cargo xtask firmware`: builds the firmware, tests its layers on the host, and lets the real
-//! `plotplan send` draw on an emulated ATmega328P.
+//! `plotplan send` draw on an emulated `ATmega328P`.
 
 mod arduino;
 mod dc;

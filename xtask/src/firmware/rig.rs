@@ -14,7 +14,7 @@ use super::trace::Trace;
 
 /// Clock of the chip, cycles per microsecond.
 pub(super) const CYCLES_PER_US: f64 = 16.0;
-/// Vectors of an ATmega328P.
+/// Vectors of an `ATmega328P`.
 const VECTORS: &[(&str, &str)] =
     &[("5", "encoders"), ("4", "encoders"), ("8", "millisecond"), ("11", "steps"), ("18", "receive")];
 /// Of open(2) on Linux.

@@ -15,7 +15,7 @@ use crate::machines::LoadedMachine;
 const VERSION: u32 = 1;
 /// Longest name that `send` puts into the first line of a plan.
 const LONGEST_NAME: usize = 24;
-/// Steps per second of a motor that an ATmega328P makes, all within 16 us of their time.
+/// Steps per second of a motor that an `ATmega328P` makes, all within 16 us of their time.
 const MOST_STEPS_S: f64 = 20_000.0;
 /// Counts per second of an encoder with both motors and the loop running.
 const MOST_COUNTS_S: f64 = 20_000.0;
@@ -33,6 +33,8 @@ const DUTY_PER_PERCENT: f64 = 8.0;
 const GAINS: [f64; 2] = [1.5, 2.0];
 /// Speed per % of duty, time constant and friction of that arm, where the machine file has no motor.
 const MODEL: [f64; 3] = [106.67, 0.12, 6.0];
+/// An RC servo's pulse at tick 0 and per 256 ticks, us.
+const SERVO: &str = "{1500, 256}";
 /// Error at which the motors stop, counts.
 const FOLLOW_COUNTS: u32 = 40;
 
@@ -77,12 +79,11 @@ pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Re
             text,
             "        {{ /* {}: {:.3} ticks per rad or mm, at most {:.1} ticks/s */\n            \
              /* .shortest_tick_us */ {shortest}, /* .reversed, .encoder_reversed */ false, false,\n            \
-             /* .lowest, .highest */ {lowest}, {highest},\n            /* .loop */ {}, /* .servo */ {},\n        }},\n",
+             /* .lowest, .highest */ {lowest}, {highest},\n            /* .loop */ {}, /* .servo */ {SERVO},\n        }},\n",
             motor.name.replace("*/", ""),
             motor.ticks_per_unit,
             motor.max_speed_ticks_s,
             feedback(described.as_ref(), index),
-            "{1500, 256}",
         );
     }
     text.push_str(
