@@ -258,7 +258,7 @@ pub fn identify(record: &[Recorded]) -> Result<Identified, IdentifyError> {
     let range = (range.0.max(p[2]), range.1.max(p[2]));
     let count = record.len() as f64;
     let rms = (squares / count).sqrt();
-    if !(rms < 0.1 * (high - low)) {
+    if rms.is_nan() || rms >= 0.1 * (high - low) {
         return Err(IdentifyError::NoFit(rms, high - low));
     }
     Ok(identified(&fit, &p, range, squares))

@@ -180,6 +180,12 @@ mod tests {
         "whole_tick_speed_allowed",
         "whole_tick_acceleration_allowed",
         "whole_tick_jerk_allowed",
+        // Gains in % of duty per tick and its integral or derivative, and factors on a loop or a value.
+        "kp",
+        "ki",
+        "kd",
+        "gain_margin",
+        "factor",
         // Shares.
         "share",
         "share_p999",
@@ -199,6 +205,8 @@ mod tests {
         "_ticks_s2",
         "_ticks_s3",
         "_mm_s",
+        "_percent",
+        "_deg",
     ];
 
     fn is_number(value: &Value) -> bool {

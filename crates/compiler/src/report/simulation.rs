@@ -298,7 +298,7 @@ pub struct StepReport {
     /// The motor.
     pub motor: String,
     /// The step, ticks.
-    pub ticks: f64,
+    pub step_ticks: f64,
     /// The largest position beyond the setpoint, ticks; 0 without overshoot.
     pub overshoot_ticks: f64,
     /// From when on the motor stays within 2 % of the step of its last position, s; `null` while it moves on.
@@ -314,7 +314,7 @@ impl StepReport {
     pub fn of(motor: &str, ticks: f64, response: &simulation::StepResponse) -> Self {
         Self {
             motor: motor.to_owned(),
-            ticks,
+            step_ticks: ticks,
             overshoot_ticks: round::ticks(response.overshoot_ticks),
             settling_s: response.settling_s.map(round::s),
             rest_ticks: round::ticks(response.rest_ticks),
@@ -324,13 +324,13 @@ impl StepReport {
 
     /// The report as text.
     pub fn text(&self) -> String {
-        let mut out = format!("motor {}, step of {} ticks\n", self.motor, self.ticks);
+        let mut out = format!("motor {}, step of {} ticks\n", self.motor, self.step_ticks);
         let _ = writeln!(out, "overshoot   {:.0} ticks", self.overshoot_ticks);
         let _ = match self.settling_s {
             Some(time) => writeln!(out, "settling    {time:.3} s (within 2 % of the step)"),
             None => writeln!(out, "settling    not within the simulated time"),
         };
-        let off = self.ticks - self.rest_ticks;
+        let off = self.step_ticks - self.rest_ticks;
         let _ = writeln!(out, "rest        {:.0} ticks, {off:.0} from the setpoint", self.rest_ticks);
         if self.swing_ticks >= 1.0 {
             let _ =

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use simulation::{Estimate, Identified};
+use simulation::Identified;
 
 use crate::tune::{Measure, Tuning};
 
@@ -128,70 +128,81 @@ fn limits(tuning: &Tuning) -> String {
     out
 }
 
-/// An identified motor.
+/// An identified motor, each value with its standard deviation. Deviations are `null` where the record
+/// says nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MotorEstimates {
-    /// Speed without load per percent of duty.
-    pub speed_per_duty_ticks_s: EstimateReport,
-    /// Time constant.
-    pub time_constant_s: EstimateReport,
+    /// Speed without load per percent of duty, ticks/s.
+    pub speed_per_duty_ticks_s: f64,
+    /// Its standard deviation, ticks/s.
+    pub speed_per_duty_deviation_ticks_s: f64,
+    /// Time constant, s.
+    pub time_constant_s: f64,
+    /// Its standard deviation, s.
+    pub time_constant_deviation_s: f64,
     /// Stiction, % of duty.
-    pub stiction_percent: EstimateReport,
-    /// Values of the stiction that fit equally well, % of duty.
+    pub stiction_percent: f64,
+    /// Its standard deviation, % of duty.
+    pub stiction_deviation_percent: f64,
+    /// Values of the stiction that fit equally well, from and to, % of duty.
     pub stiction_range_percent: [f64; 2],
     /// Coulomb friction, % of duty.
-    pub friction_percent: EstimateReport,
+    pub friction_percent: f64,
+    /// Its standard deviation, % of duty.
+    pub friction_deviation_percent: f64,
     /// What the model leaves over, ticks RMS.
     pub residual_rms_ticks: f64,
-}
-
-/// A value with its standard deviation; `null` where it is not finite.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct EstimateReport {
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation.
-    pub deviation: f64,
-    /// Whether the record determines it.
-    pub determined: bool,
-}
-
-impl From<Estimate> for EstimateReport {
-    fn from(estimate: Estimate) -> Self {
-        let Estimate { value, deviation, determined } = estimate;
-        Self { value, deviation, determined }
-    }
+    /// The keys of a machine file that the record does not determine.
+    pub undetermined: Vec<&'static str>,
 }
 
 impl MotorEstimates {
     /// The report of an identification.
     pub fn of(found: &Identified) -> Self {
+        let [g, tau, stiction, friction] = [
+            found.speed_per_duty_ticks_s,
+            found.time_constant_s,
+            found.stiction_percent,
+            found.friction_percent,
+        ];
+        let keys = ["speed_per_duty", "time_constant", "stiction", "friction"];
+        let open = keys.into_iter().zip([g, tau, stiction, friction]);
         Self {
-            speed_per_duty_ticks_s: found.speed_per_duty_ticks_s.into(),
-            time_constant_s: found.time_constant_s.into(),
-            stiction_percent: found.stiction_percent.into(),
+            speed_per_duty_ticks_s: g.value,
+            speed_per_duty_deviation_ticks_s: g.deviation,
+            time_constant_s: tau.value,
+            time_constant_deviation_s: tau.deviation,
+            stiction_percent: stiction.value,
+            stiction_deviation_percent: stiction.deviation,
             stiction_range_percent: [found.stiction_range.0, found.stiction_range.1],
-            friction_percent: found.friction_percent.into(),
+            friction_percent: friction.value,
+            friction_deviation_percent: friction.deviation,
             residual_rms_ticks: found.residual_rms_ticks,
+            undetermined: open.filter(|(_, estimate)| !estimate.determined).map(|(key, _)| key).collect(),
         }
     }
 
-    fn rows(&self) -> [(&'static str, &'static str, f64, EstimateReport); 4] {
+    /// Key, unit, value and standard deviation of each parameter.
+    fn rows(&self) -> [(&'static str, &'static str, [f64; 2]); 4] {
+        let ms = |time_s: f64| 1e3 * time_s;
         [
-            ("speed_per_duty", "ticks/s", 1.0, self.speed_per_duty_ticks_s),
-            ("time_constant", "ms", 1e3, self.time_constant_s),
-            ("stiction", "% of duty", 1.0, self.stiction_percent),
-            ("friction", "% of duty", 1.0, self.friction_percent),
+            (
+                "speed_per_duty",
+                "ticks/s",
+                [self.speed_per_duty_ticks_s, self.speed_per_duty_deviation_ticks_s],
+            ),
+            ("time_constant", "ms", [self.time_constant_s, self.time_constant_deviation_s].map(ms)),
+            ("stiction", "% of duty", [self.stiction_percent, self.stiction_deviation_percent]),
+            ("friction", "% of duty", [self.friction_percent, self.friction_deviation_percent]),
         ]
     }
 
     /// The report as text, with a table to paste where all is determined.
     pub fn text(&self, rows: usize) -> String {
         let mut out = format!("{rows} rows, {:.2} ticks RMS left over\n", self.residual_rms_ticks);
-        for (key, unit, scale, estimate) in self.rows() {
+        for (key, unit, [value, deviation]) in self.rows() {
             let _ = write!(out, "{key:<15} ");
-            let _ = if estimate.determined {
-                let (value, deviation) = (scale * estimate.value, scale * estimate.deviation);
+            let _ = if !self.undetermined.contains(&key) {
                 writeln!(out, "{value:.3} {unit}, standard deviation {deviation:.3}")
             } else if key == "stiction" {
                 let [from, to] = self.stiction_range_percent;
@@ -200,31 +211,29 @@ impl MotorEstimates {
                 writeln!(out, "not determined")
             };
         }
-        if self.undetermined().is_none() {
+        if self.undetermined.is_empty() {
             let _ = write!(
                 out,
                 "\n[[drive.motor]]\nkind = \"dc\"\nspeed_per_duty = \"{:.2}ticks/s\"\ntime_constant = \"{:.2}ms\"\nstiction = {:.2}\nfriction = {:.2}\n",
-                self.speed_per_duty_ticks_s.value,
-                1e3 * self.time_constant_s.value,
-                self.stiction_percent.value.max(self.friction_percent.value),
-                self.friction_percent.value,
+                self.speed_per_duty_ticks_s,
+                1e3 * self.time_constant_s,
+                self.stiction_percent.max(self.friction_percent),
+                self.friction_percent,
             );
         }
         out
     }
 
     /// What the record does not determine, and what would help; `None` if it determines all.
-    pub fn undetermined(&self) -> Option<String> {
-        let open: Vec<&str> =
-            self.rows().iter().filter(|row| !row.3.determined).map(|(key, ..)| *key).collect();
-        if open.is_empty() {
+    pub fn advice(&self) -> Option<String> {
+        if self.undetermined.is_empty() {
             return None;
         }
-        let help = if open == ["stiction"] {
+        let help = if self.undetermined == ["stiction"] {
             "add a slow ramp of the duty from rest until the motor moves"
         } else {
             "record a slow ramp from rest, then runs at two or more duties and back to rest"
         };
-        Some(format!("the record does not determine {}: {help}", open.join(", ")))
+        Some(format!("the record does not determine {}: {help}", self.undetermined.join(", ")))
     }
 }

@@ -75,7 +75,7 @@ fn from_step(file: &str) -> Result<(), Failure> {
         .with_context(|| format!("{} cannot be used", input.name))
         .map_err(Failure::Drawing)?;
     let report = tuning::MotorEstimates::of(&found);
-    let (text, open) = (report.text(record.len()), report.undetermined());
+    let (text, open) = (report.text(record.len()), report.advice());
     session::report(|all| all.motor = Some(report));
     output::report(&text)?;
     let Some(what) = open else { return Ok(()) };
