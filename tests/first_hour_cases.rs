@@ -89,7 +89,7 @@ fn closed_circle_around_the_base_starts_where_the_joint_allows_it() {
 #[test]
 fn placement_that_a_message_promises_works() {
     let dir = TestDir::new();
-    dir.write("arm.toml", &ARM.replace("185deg", "100deg"));
+    dir.write("arm.toml", ARM.replace("185deg", "100deg"));
     for drawing in [
         "IN;SP1;PU2000,2000;CI1200;PU;",
         "IN;SP1;PU9000,9000;PD9400,9000,9400,9400;PU;",
@@ -255,8 +255,12 @@ fn info_of_a_gcode_file_of_ours() {
         let number = |key: &str| program[key].as_f64().expect("a number");
         let ink = 20.0 + 20.0 * std::f64::consts::PI;
         assert!((number("ink_mm") - ink).abs() < 0.1, "{format}: {program}");
-        let bounds: Vec<f64> =
-            program["bounds_mm"].as_array().expect("bounds").iter().filter_map(|n| n.as_f64()).collect();
+        let bounds: Vec<f64> = program["bounds_mm"]
+            .as_array()
+            .expect("bounds")
+            .iter()
+            .filter_map(serde_json::Value::as_f64)
+            .collect();
         let near =
             bounds.iter().zip([10.0, 10.0, 60.0, 60.0]).all(|(found, right)| (found - right).abs() < 0.1);
         assert!(near, "{format}: {bounds:?}");

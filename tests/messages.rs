@@ -17,7 +17,9 @@ fn run(dir: &TestDir, arguments: &str) -> String {
     let mut text = String::from_utf8_lossy(&output.stderr).into_owned();
     // What fails is part of the report of verify.
     let stdout = String::from_utf8_lossy(&output.stdout);
-    stdout.lines().filter(|line| line.contains("FAILED")).for_each(|line| text += &format!("{line}\n"));
+    for line in stdout.lines().filter(|line| line.contains("FAILED")) {
+        text.extend([line, "\n"]);
+    }
     let code = output.status.code().expect("an exit code");
     format!("$ plotplan {arguments}\n{text}[{code}]\n\n")
 }

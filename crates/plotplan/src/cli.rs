@@ -41,7 +41,7 @@ pub(crate) struct Messages {
     /// Print all diagnostics, not only the first five of a kind
     #[arg(long, global = true)]
     pub(crate) all: bool,
-    /// Colour in messages; `auto` is colour on a terminal, unless NO_COLOR is set
+    /// Colour in messages; `auto` is colour on a terminal, unless `NO_COLOR` is set
     #[arg(long, value_enum, global = true, value_name = "WHEN", default_value_t = Color::Auto)]
     pub(crate) color: Color,
 }
@@ -49,7 +49,7 @@ pub(crate) struct Messages {
 /// When messages have colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Color {
-    /// On a terminal, unless NO_COLOR is set
+    /// On a terminal, unless `NO_COLOR` is set
     Auto,
     /// Always
     Always,

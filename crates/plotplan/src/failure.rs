@@ -119,7 +119,11 @@ fn kind_of(error: &anyhow::Error) -> Option<Code> {
 
 /// Whether the command line or the machine file is wrong.
 fn usage_kind(error: &anyhow::Error) -> Code {
-    if error.chain().any(|cause| cause.is::<MachineFileError>()) { Code::MachineFile } else { Code::Usage }
+    if error.chain().any(<dyn std::error::Error>::is::<MachineFileError>) {
+        Code::MachineFile
+    } else {
+        Code::Usage
+    }
 }
 
 /// The line of a machine file that a message is about.

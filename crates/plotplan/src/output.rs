@@ -44,7 +44,7 @@ pub(crate) fn write(
         use std::os::unix::fs::PermissionsExt as _;
         temporary.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = temporary.tempfile_in(folder).map_err(|error| failed(without_path(error)))?;
+    let file = temporary.tempfile_in(folder).map_err(|error| failed(without_path(&error)))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
     write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
     let file = out.into_inner().map_err(|error| failed(error.into_error()))?;
@@ -53,7 +53,7 @@ pub(crate) fn write(
 }
 
 /// The system's own error: the text around it names the temporary file.
-fn without_path(error: std::io::Error) -> std::io::Error {
+fn without_path(error: &std::io::Error) -> std::io::Error {
     use std::error::Error as _;
     let inner = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
     match error.raw_os_error().or_else(|| inner.and_then(std::io::Error::raw_os_error)) {

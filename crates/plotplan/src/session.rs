@@ -52,7 +52,7 @@ pub(crate) fn begin(options: &Messages, command: &str) {
     }
 }
 
-/// Sets the colour of messages. `auto` is colour on terminals, unless NO_COLOR is set.
+/// Sets the colour of messages. `auto` is colour on terminals, unless `NO_COLOR` is set.
 pub(crate) fn set_color(color: Color) {
     let choice = match color {
         Color::Auto => anstream::ColorChoice::Auto,

@@ -91,7 +91,7 @@ fn for_plotter(inputs: &Inputs, arranged: &Arranged, sheet: &Sheet<'_>) -> Resul
         };
         Failure::Drawing(anyhow::anyhow!("{}: {error}{help}", inputs.name()))
     })?;
-    Ok(lines.iter().map(|line| format!("{}\n", line.text)).collect())
+    Ok(lines.iter().flat_map(|line| [line.text.as_str(), "\n"]).collect())
 }
 
 /// What drawings without a plan are arranged for.
