@@ -50,7 +50,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "verify",
         ],
     ),
-    ("xtask", &["compiler", "drawing", "hpgl", "kinematics", "ordering", "plan", "planner", "simulation", "svg"]),
+    (
+        "xtask",
+        &["compiler", "drawing", "hpgl", "kinematics", "ordering", "plan", "planner", "simulation", "svg"],
+    ),
 ];
 
 /// Any crate may use this one in its tests, and none outside of them.

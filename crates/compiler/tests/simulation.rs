@@ -1,6 +1,8 @@
 //! Predicted ink of the coaxial arm on examples/zot.hpgl, against independent code: explicit Euler of
-//! the same equations in Python, nearest points by a k-d tree (SciPy), on a plan of an earlier
+//! the same equations in Python, nearest points by a k-d tree (`SciPy`), on a plan of an earlier
 //! planner. Loads and gains as in docs/simulation.md.
+
+use std::fmt::Write as _;
 
 use compiler::machine_file::{MachineFile, PRESETS};
 use compiler::pipeline::{self, Order, Request};
@@ -23,9 +25,9 @@ struct Zot {
 
 impl Zot {
     fn new() -> Self {
-        let machine = MachineFile::parse(PRESETS[0].toml).unwrap().machine().unwrap();
+        let machine = MachineFile::parse(PRESETS[0].toml).expect("a preset").machine().expect("a machine");
         let bytes = include_bytes!("../../../examples/zot.hpgl");
-        let document = import::read(bytes, &import::Options::default()).unwrap();
+        let document = import::read(bytes, &import::Options::default()).expect("a drawing");
         let request = Request {
             tolerance_mm: 0.1,
             period_us: 10_000,
@@ -38,7 +40,8 @@ impl Zot {
             timing_law: TimingLaw::TimeOptimal,
             allow_over_limit: false,
         };
-        let compiled = pipeline::compile(&document.pages[0].drawing, &machine, &request, &|_| {}).unwrap();
+        let compiled =
+            pipeline::compile(&document.pages[0].drawing, &machine, &request, &|_| {}).expect("a plan");
         let rows = compiled.trajectory.rows().map(|row| row.row).collect();
         let drawing = compiled.ordered().clone();
         Self { rows, drawing, machine: machine.clone() }
@@ -47,7 +50,7 @@ impl Zot {
     fn simulate(&self, drive: &Drive) -> Result<Simulated, SimulationError> {
         let plan =
             Plan { machine: &self.machine, rows: &self.rows, period_us: 10_000, drawing: &self.drawing };
-        drive.validate().unwrap();
+        drive.validate().expect("a possible drive");
         simulate(&plan, drive, |_| {})
     }
 }
@@ -95,10 +98,13 @@ fn zot_ink_is_that_of_independent_code_and_ranks_as_there() {
     let mut table = String::new();
     for (name, drive, [max, rms, missed]) in cases {
         let ink = zot.simulate(&drive).unwrap().ink;
-        table += &format!(
-            "{name}: {:.3} {:.4} {:.4}, independent {max} {rms} {missed}\n",
-            ink.stray.max_mm, ink.stray.rms_mm, ink.missed.rms_mm
-        );
+        let (stray, missed_rms_mm) = (ink.stray, ink.missed.rms_mm);
+        writeln!(
+            table,
+            "{name}: {:.3} {:.4} {missed_rms_mm:.4}, independent {max} {rms} {missed}",
+            stray.max_mm, stray.rms_mm
+        )
+        .expect("a string takes all text");
         assert!((ink.stray.rms_mm / rms - 1.0).abs() < 0.05, "{table}");
         assert!((ink.missed.rms_mm / missed - 1.0).abs() < 0.05, "{table}");
         assert!((ink.stray.max_mm / max - 1.0).abs() < 0.15, "{table}");
@@ -156,7 +162,7 @@ fn error_of(from: &str, to: &str) -> String {
     let toml = PRESETS[0].toml;
     assert!(toml.contains(from), "{from}");
     let result = MachineFile::parse(&toml.replacen(from, to, 1)).and_then(|file| file.machine());
-    let error = result.unwrap_err();
+    let error = result.expect_err("refused");
     let source = std::error::Error::source(&error).map(|source| format!(": {source}"));
     format!("{error}{}", source.unwrap_or_default())
 }
