@@ -10,7 +10,7 @@
  *     --switch N,M,POS  switch N (1, 2, or 4 for stop) is closed while motor M is at or below POS
  *     --at S,EVENT      S seconds after the first motion: reset, hang, unplug1, unplug2,
  *                       close1, close2, close4, open1, open2, open4
- *     --garble-in N, --garble-out N   one byte in N is damaged, on the way to and from the chip
+ *     --garble-in N, --garble-out N   one byte in N is damaged, to and from the chip; N > 40
  *     --seed N          of these
  *     --pace X          X times real time at most (4)
  *     --hang ADDRESS    `hang` continues there (hexadecimal)
@@ -61,12 +61,16 @@ static uint32_t random32(void) {
     return (uint32_t)(random_state >> 16);
 }
 
-static uint8_t damage(uint8_t byte, uint32_t one_in) {
-    if (one_in && random32() % one_in == 0) {
-        garbled++;
-        return byte ^ (uint8_t)(1u << random32() % 8);
+/* The checksum of tick lines, an exclusive or, does not see two flips of the same bit: damaged bytes are
+ * at least a line apart. `since` counts the bytes of one direction. */
+#define APART 40
+static uint8_t damage(uint8_t byte, uint32_t one_in, uint32_t *since) {
+    if (one_in <= APART || ++*since < APART || random32() % (one_in - APART) != 0) {
+        return byte;
     }
-    return byte;
+    *since = 0;
+    garbled++;
+    return byte ^ (uint8_t)(1u << random32() % 8);
 }
 
 static void moved(void) {
@@ -256,7 +260,8 @@ static uint64_t bytes_in, bytes_out;
 static void on_uart(struct avr_irq_t *irq, uint32_t value, void *param) {
     (void)irq;
     (void)param;
-    uint8_t byte = damage((uint8_t)value, garble_out);
+    static uint32_t since;
+    uint8_t byte = damage((uint8_t)value, garble_out, &since);
     bytes_out++;
     if (master >= 0 && write(master, &byte, 1) != 1) {
         /* nobody reads */
@@ -284,6 +289,7 @@ static void open_port(const char *link) {
 
 static void feed(avr_irq_t *receiver) {
     static uint64_t next_byte, next_read;
+    static uint32_t since;
     if (pending_from == pending_to && avr->cycle >= next_read) {
         next_read = avr->cycle + 1600;
         ssize_t got = read(master, pending, sizeof pending);
@@ -292,7 +298,7 @@ static void feed(avr_irq_t *receiver) {
     }
     if (pending_from < pending_to && avr->cycle >= next_byte) {
         uint8_t byte = pending[pending_from++];
-        avr_raise_irq(receiver, damage(byte, garble_in));
+        avr_raise_irq(receiver, damage(byte, garble_in, &since));
         bytes_in++;
         next_byte = avr->cycle + BYTE_CYCLES;
     }

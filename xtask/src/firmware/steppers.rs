@@ -29,7 +29,7 @@ pub(super) fn run(bench: &mut Bench) {
     bench.check("house, every step", |bench| draw(bench, &bench.example("house.hpgl"), &[]));
     bench.check("both motors at 20 000 and 16 600 steps/s", full_speed);
     bench.check("25 random plans up to 20 000 steps/s", random_plans);
-    bench.check("1 % of bytes damaged each way", damaged_bytes);
+    bench.check("1 % of bytes damaged each way, one in a line", damaged_bytes);
     bench.check("reset while drawing", |bench| chip_reset(bench, "reset"));
     bench.check("watchdog ends a hanging program", |bench| chip_reset(bench, "hang"));
     bench.check("Ctrl-C and resume", interrupted);
