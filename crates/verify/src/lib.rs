@@ -56,7 +56,7 @@
 //! let certificate = verify(&rows);
 //! assert!(certificate.holds, "{:?}", certificate.failures);
 //! assert!((certificate.ink_mm - 20.0).abs() < 1e-9);
-//! assert!((certificate.motors[0].speed_ticks_s - 500.0).abs() < 1e-9);
+//! assert!((certificate.motors[0].whole_tick_speed_ticks_s - 500.0).abs() < 1e-9);
 //!
 //! // One row that is 3 mm off the line: the ink deviates there.
 //! rows[4].ticks[1] = 30;
