@@ -138,7 +138,7 @@ impl StrokePlanner<'_> {
     /// The stroke as one spline; `None` where there is none within the tolerance and the reach.
     fn spline(&self, stroke: &Stroke, start: JointPos) -> Option<Lifted> {
         let limits = Limits::new(self.machine, self.settings.speed_of(self.machine, stroke.pen));
-        let mut section = fitted(stroke, &limits, self.budget.spline_mm, self.budget.aim)?;
+        let mut section = fitted(stroke, &limits, self.budget.spline_mm?, self.budget.aim)?;
         let row = self.budget.path.row_mm;
         if row.is_finite() {
             section =

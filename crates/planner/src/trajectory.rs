@@ -120,9 +120,9 @@ pub fn plan_with_progress<'a>(
     }
     let trajectory = Trajectory {
         machine,
+        budget: ToleranceBudget::of(machine, settings, &drawing),
         drawing,
         settings: settings.clone(),
-        budget: ToleranceBudget::of(machine, settings),
         cached: None,
         periods: 0,
         rows: 1,
