@@ -217,7 +217,7 @@ impl Trajectory<'_> {
     pub fn rows(&self) -> Rows<'_> {
         let source = match &self.cached {
             Some(cached) => Source::Cached(cached.iter()),
-            None => Source::Planned(self.motions()),
+            None => Source::Planned(Box::new(self.motions())),
         };
         Rows {
             machine: self.machine,
@@ -361,7 +361,7 @@ impl Motions<'_> {
 #[derive(Clone, Debug)]
 enum Source<'a> {
     Cached(std::slice::Iter<'a, Motion>),
-    Planned(Motions<'a>),
+    Planned(Box<Motions<'a>>),
 }
 
 impl<'a> Source<'a> {
