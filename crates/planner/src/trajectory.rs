@@ -104,10 +104,10 @@ pub fn plan<'a>(
     plan_with_progress(machine, drawing, settings, &|_, _| {})
 }
 
-/// As [`plan`]; `progress` is called with the strokes planned and all strokes, after each batch.
+/// As [`plan()`]; `progress` is called with the strokes planned and all strokes, after each batch.
 ///
 /// # Errors
-/// Those of [`plan`].
+/// Those of [`plan()`].
 pub fn plan_with_progress<'a>(
     machine: &'a Machine,
     drawing: Drawing,

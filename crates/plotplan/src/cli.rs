@@ -531,7 +531,7 @@ pub(crate) struct Simulate {
     /// Plan or drawing; `-` for standard input
     #[arg(required_unless_present = "step")]
     pub(crate) file: Option<String>,
-    /// Machine with a [drive] table; for a plan document only to take another drive
+    /// Machine with a `[drive]` table; for a plan document only to take another drive
     #[arg(short, long, value_name = "NAME|FILE.toml")]
     pub(crate) machine: Option<String>,
     /// For a plan: the drawing that the ink is compared with, instead of the plan's own ink
@@ -564,7 +564,7 @@ pub(crate) struct Simulate {
 
 #[derive(Debug, Args)]
 pub(crate) struct Tune {
-    /// Machine with a [drive] table
+    /// Machine with a `[drive]` table
     #[arg(short, long, value_name = "NAME|FILE.toml", required_unless_present = "from_step")]
     pub(crate) machine: Option<String>,
     /// Drawing whose ink error is to be least [default: a test pattern of lines, corners and a circle]

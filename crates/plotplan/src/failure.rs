@@ -12,7 +12,7 @@ use crate::{cli, machines, session, terminal};
 /// Why a command stops.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The failure was reported with [`terminal::error`] or [`terminal::at_place`]; exit by its code.
+    /// The failure was reported with [`terminal::error`] or [`terminal::error_at`]; exit by its code.
     Refused,
     /// The drawing or plan cannot be used: exit 1.
     Drawing(anyhow::Error),
