@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use drawing::{Drawing, EllipticArc, Point, Segment, Stroke, Vec2};
+use drawing::{Drawing, EllipticArc, Point, Segment, Stroke, Vec2, distance};
 
 use super::plotter::Sheet;
 use super::program::{polyline, with_durations};
@@ -134,7 +134,7 @@ impl Encoder<'_> {
                 drew = true;
                 // Whole degrees end up to one degree short of the end, and the plotter may or may not round
                 // where it stops.
-                if (arc.at(here, arc.sweep_degrees as f64) - point_of(end)).hypot() > 1e-6 {
+                if distance(arc.at(here, arc.sweep_degrees as f64), point_of(end)) > 1e-6 {
                     points.push(end);
                 }
             } else {
@@ -235,7 +235,7 @@ impl DeviceArc {
     fn about(center: Units, arc: &EllipticArc, start: Units, end: Units) -> Option<Self> {
         let arm = |to: Units| Vec2::new((to.0 - center.0) as f64, (to.1 - center.1) as f64);
         let (from, to) = (arm(start), arm(end));
-        let radius = from.hypot();
+        let radius = libm::hypot(from.x, from.y);
         // Counterclockwise for positive sweeps on the paper: the sign of the map of `a` and `b`.
         let turn = if arc.a.cross(arc.b) >= 0.0 { 1.0 } else { -1.0 };
         let sweep_rad = turn * arc.sweep_rad;
@@ -280,14 +280,14 @@ impl DeviceArc {
         let sweep = self.sweep_degrees as f64;
         let off = |k: u32| {
             let at = self.at(start, sweep * f64::from(k) / f64::from(SAMPLES));
-            ((at - arc.center).hypot() - radius).abs()
+            (distance(at, arc.center) - radius).abs()
         };
         let circle = (0..=SAMPLES).map(off).fold(0.0, f64::max);
         let chord = radius * (1.0 - libm::cos((0.5 * self.chord_degrees as f64).to_radians()));
         let short = (arc.sweep_rad.abs().to_degrees() - sweep.abs()).max(0.0);
         // Half diagonals of two rounded points.
         let rest = radius * short.to_radians() + 1.5;
-        let gap = (self.at(start, sweep) - point_of(end)).hypot();
+        let gap = distance(self.at(start, sweep), point_of(end));
         if gap > rest { f64::INFINITY } else { circle + chord }
     }
 }
