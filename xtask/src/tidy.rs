@@ -9,6 +9,7 @@ use anyhow::{Context as _, Result};
 const ALLOWED: &[(&str, &[&str])] = &[
     ("drawing", &[]),
     ("plan", &[]),
+    ("viewer", &[]),
     ("test-support", &["drawing", "kinematics"]),
     ("hpgl", &["drawing"]),
     ("svg", &["drawing"]),
@@ -32,6 +33,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "simulation",
             "svg",
             "verify",
+            "viewer",
         ],
     ),
     (
@@ -81,7 +83,7 @@ const LONG: usize = 800;
 pub(crate) fn run() -> Result<bool> {
     let top = crate::top();
     let mut violations = Vec::new();
-    let mut manifests = vec![top.join("xtask/Cargo.toml")];
+    let mut manifests = vec![top.join("viewer/Cargo.toml"), top.join("xtask/Cargo.toml")];
     for entry in std::fs::read_dir(top.join("crates")).context("cannot list the folder crates")? {
         manifests.push(entry?.path().join("Cargo.toml"));
     }

@@ -50,3 +50,4 @@ pub mod scene;
 pub mod settings;
 pub mod simulate;
 pub mod tune;
+pub mod view;

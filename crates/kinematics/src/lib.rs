@@ -55,6 +55,7 @@
 //! ```
 
 mod coupling;
+mod linkage;
 mod machine;
 pub mod mechanism;
 mod position;
@@ -62,6 +63,7 @@ mod reach;
 mod workspace;
 
 pub use coupling::{Coupling, SingularCoupling};
+pub use linkage::{Anchor, JointAffine, Linkage, Part, PartKind};
 pub use machine::{JointRange, Machine, MachineError, MachineParts, Motor, PenLimits, Quantity};
 pub use mechanism::{Cartesian, JointKind, Mechanism, Polar, TwoLink, Unreachable};
 pub use position::{JointPos, MotorPos};

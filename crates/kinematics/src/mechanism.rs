@@ -10,14 +10,14 @@ mod two_link;
 
 use std::fmt::Debug;
 
-use drawing::{Line, Point, Vec2};
+use drawing::{Line, Point, Rect, Vec2};
 
 pub use cartesian::Cartesian;
 pub use parameters::{Kind, ParameterError, Parameters};
 pub use polar::Polar;
 pub use two_link::TwoLink;
 
-use crate::{JointPos, MachineError};
+use crate::{JointPos, Linkage, MachineError};
 
 /// The mechanisms that machine files can name.
 pub const KINDS: &[Kind] = &[Kind::of::<Cartesian>(), Kind::of::<TwoLink>(), Kind::of::<Polar>()];
@@ -124,6 +124,10 @@ pub trait Mechanism: Debug + Send + Sync {
     /// Whether the pen's position is an affine function of the joints, so that its derivatives along
     /// a path are proportional to the joints'.
     fn is_linear(&self) -> bool;
+
+    /// Its points and parts, so that it can be drawn in any pose. The sheet, machine mm, gives parts
+    /// a length that the kinematics do not know, such as that of a gantry.
+    fn linkage(&self, sheet: Rect) -> Linkage;
 
     /// The mechanism as a two-link arm, if it is one: its links have masses in simulations.
     fn as_two_link(&self) -> Option<&TwoLink> {

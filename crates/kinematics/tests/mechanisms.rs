@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use drawing::{Line, Point, Vec2};
+use drawing::{Line, Point, Rect, Vec2};
 use kinematics::mechanism::KINDS;
-use kinematics::{JointPos, Mechanism, Unreachable};
+use kinematics::{Anchor, JointPos, Mechanism, Unreachable};
 use proptest::prelude::*;
 use test_support::machines::point_within;
 use test_support::mechanisms::{mechanism, unwrapped};
@@ -54,6 +54,24 @@ proptest! {
                 prop_assert!(m.inverse(p + (by - 1e-9 * by.signum()) * outwards).is_err());
             }
         }
+    }
+
+    #[test]
+    fn linkage_ends_at_the_pen_and_its_anchors_follow_earlier_ones((m, q) in posed()) {
+        let linkage = m.linkage(Rect::new(20.0, 40.0, 230.0, 340.0));
+        let points = linkage.points(&q);
+        prop_assert!(size(points[linkage.pen] - m.forward(&q)) < 1e-9);
+        for (index, anchor) in linkage.anchors.iter().enumerate() {
+            if let Anchor::Moving { from, .. } = anchor {
+                prop_assert!(*from < index);
+            }
+        }
+        for part in &linkage.parts {
+            prop_assert!(part.from < points.len() && part.to < points.len());
+        }
+        // Some part moves: a picture of the machine shows its pose.
+        let moved = linkage.points(&(q + JointPos::new(0.1, 0.1)));
+        prop_assert!(linkage.parts.iter().any(|part| size(points[part.to] - moved[part.to]) > 0.0));
     }
 
     #[test]

@@ -11,5 +11,5 @@ pub mod png;
 pub mod scene;
 pub mod svg;
 
-pub use palette::{Colour, PenColors};
+pub use palette::{Colour, PenColors, ink_color};
 pub use scene::{Ink, InkLine, LEVELS, Scene, Shades};

@@ -39,6 +39,11 @@ pub(crate) fn colour_on_white(pen: u16, own: &PenColors) -> Colour {
     if luminance > LIGHTEST { pen_colour(pen, &PenColors::new()) } else { pen_colour(pen, own) }
 }
 
+/// The colour of a pen's ink on white paper, as `#rrggbb`.
+pub fn ink_color(pen: u16, own: &PenColors) -> String {
+    hex(colour_on_white(pen, own))
+}
+
 /// The colour as SVG writes it.
 pub(crate) fn hex([red, green, blue]: Colour) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")

@@ -502,7 +502,8 @@ pub(crate) struct Preview {
     /// Plan, or drawings, which are drawn over each other; `-` for standard input
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<String>,
-    /// Picture to write: NAME.svg or NAME.png; `-` for standard output
+    /// Picture to write: NAME.svg or NAME.png, or NAME.html: the plan as it is drawn, in one page for the browser; `-` for
+    /// standard output
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: String,
     /// Format of the picture [default: by the extension of --output; svg on standard output]
@@ -524,6 +525,8 @@ pub(crate) enum PictureFormat {
     Svg,
     /// Pixels, 1600 along the longer side
     Png,
+    /// A page for the browser that shows machine and pen in motion; it needs no network
+    Html,
 }
 
 #[derive(Debug, Args)]
@@ -540,8 +543,8 @@ pub(crate) struct Simulate {
     /// Exit with 1 when ink strays or is missed by more than this
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub(crate) within: Option<f64>,
-    /// Write the predicted ink over the drawing (NAME.svg, NAME.png), or the motion every 2 ms (NAME.csv); with --step its
-    /// response (NAME.svg, NAME.csv)
+    /// Write the predicted ink over the drawing (NAME.svg, NAME.png; NAME.html: in motion, in one page for the browser), or
+    /// the motion every 2 ms (NAME.csv); with --step its response (NAME.svg, NAME.csv)
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: Option<String>,
     /// Setpoints, instead of those of the drive

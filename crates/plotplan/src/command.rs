@@ -7,6 +7,7 @@ mod emulate;
 mod firmware_config;
 mod info;
 mod machine;
+mod page;
 mod preview;
 mod send;
 mod simulate;

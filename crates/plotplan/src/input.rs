@@ -17,6 +17,7 @@ use crate::failure::Failure;
 use crate::{fonts, session, terminal};
 
 /// A file's bytes and what to call it.
+#[derive(Clone)]
 pub(crate) struct Input {
     /// Its base name: a plan must not depend on the folder of the drawing.
     pub(crate) name: String,
@@ -84,6 +85,7 @@ pub(crate) fn read(file: &str) -> Result<Input, Failure> {
 }
 
 /// The files of a drawing, one or several that are drawn over each other.
+#[derive(Clone)]
 pub(crate) struct Inputs(Vec<Input>);
 
 impl Inputs {
@@ -108,6 +110,11 @@ impl Inputs {
     /// The only file; `None` for several.
     pub(crate) fn single(&self) -> Option<&Input> {
         if let [input] = &self.0[..] { Some(input) } else { None }
+    }
+
+    /// All files, in their order.
+    pub(crate) fn all(&self) -> &[Input] {
+        &self.0
     }
 
     /// What to call the drawing: the files' names.

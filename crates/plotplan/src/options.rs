@@ -234,10 +234,20 @@ fn drawing(options: &Given<'_>) -> Option<String> {
 }
 
 fn preview(options: &Given<'_>) -> Option<String> {
+    if is_page(options) {
+        return planning(options);
+    }
     options
         .refuse(&PLANNING, "on a preview, which shows the file's order")
         .or_else(|| sheet(options))
         .or_else(|| margin(options))
+}
+
+/// Whether a preview is a page, which shows a plan.
+fn is_page(options: &Given<'_>) -> bool {
+    let output = options.text("output").to_ascii_lowercase();
+    let by_extension = [".html", ".htm"].iter().any(|extension| output.ends_with(extension));
+    options.text("format") == "html" || by_extension && !options.has("format")
 }
 
 #[cfg(test)]
@@ -333,6 +343,7 @@ mod tests {
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "-mcorexy"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "--paper", "a4"]);
+        row(&["plotplan", "preview", "x.hpgl", "-ox.html", "-mcorexy"]);
         row(&["plotplan", "simulate", "x.hpgl", "-mcoaxial"]);
         row(&["plotplan", "simulate", "-mcoaxial", "--step", "3200"]);
         row(&["plotplan", "tune", "-mcoaxial"]);

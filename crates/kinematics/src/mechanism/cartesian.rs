@@ -1,10 +1,13 @@
 //! A table whose joints are the pen's coordinates.
 
-use drawing::{Point, Vec2};
+use std::f64::consts::FRAC_PI_2;
+
+use drawing::{Point, Rect, Vec2};
 
 use super::parameters::{FromParameters, ParameterError, Parameters};
 use super::{JointKind, Mechanism, Unreachable};
-use crate::JointPos;
+use crate::linkage::{moving, part};
+use crate::{Anchor, JointAffine, JointPos, Linkage, PartKind};
 
 /// `q = (x, y)` and `p = q`: plain tables, CoreXY, H-bot (these differ in their coupling only).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,6 +69,31 @@ impl Mechanism for Cartesian {
 
     fn is_linear(&self) -> bool {
         true
+    }
+
+    /// Two rails along x beside the sheet, a gantry along y between them, and a carriage on it.
+    fn linkage(&self, sheet: Rect) -> Linkage {
+        let beside = 0.04 * sheet.width().max(sheet.height());
+        let frame = sheet.inflate(beside, beside);
+        let fixed = |x: f64, y: f64| Anchor::Fixed(Point::new(x, y));
+        let (x, y) = (JointAffine::joint(0), JointAffine::joint(1));
+        let (along_x, along_y) = (JointAffine::default(), JointAffine::fixed(FRAC_PI_2));
+        let anchors = vec![
+            fixed(frame.x0, frame.y0),
+            fixed(frame.x1, frame.y0),
+            fixed(frame.x0, frame.y1),
+            fixed(frame.x1, frame.y1),
+            fixed(0.0, frame.y0),
+            fixed(0.0, frame.y1),
+            fixed(0.0, 0.0),
+            moving(4, x, along_x),
+            moving(5, x, along_x),
+            moving(6, x, along_x),
+            moving(9, y, along_y),
+        ];
+        let rails = [part(PartKind::Rail, 0, 1), part(PartKind::Rail, 2, 3)];
+        let gantry = [part(PartKind::Link, 7, 8), part(PartKind::Pivot, 10, 10)];
+        Linkage { anchors, parts: [rails, gantry].concat(), pen: 10 }
     }
 }
 

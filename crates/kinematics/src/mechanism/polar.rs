@@ -1,10 +1,11 @@
 //! A rail that turns about the base, with a pen that slides along it.
 
-use drawing::{Point, Vec2};
+use drawing::{Point, Rect, Vec2};
 
 use super::parameters::{FromParameters, ParameterError, Parameters};
 use super::{JointKind, Mechanism, Unreachable, frame};
-use crate::JointPos;
+use crate::linkage::{moving, part};
+use crate::{Anchor, JointAffine, JointPos, Linkage, PartKind};
 
 /// `q = (phi, r)`: `p = r e(phi)`, with e(phi) = (cos phi, sin phi) and t(phi) = (-sin phi, cos phi).
 ///
@@ -90,6 +91,24 @@ impl Mechanism for Polar {
 
     fn is_linear(&self) -> bool {
         false
+    }
+
+    /// A rail that turns about the pole, and a rack on it that carries the pen: as long as the way
+    /// to the sheet's farthest corner.
+    fn linkage(&self, sheet: Rect) -> Linkage {
+        let corners =
+            [(sheet.x0, sheet.y0), (sheet.x1, sheet.y0), (sheet.x0, sheet.y1), (sheet.x1, sheet.y1)];
+        let farthest = corners.into_iter().map(|(x, y)| libm::hypot(x, y)).fold(0.0, f64::max);
+        let phi = JointAffine::joint(0);
+        let anchors = vec![
+            Anchor::Fixed(Point::ZERO),
+            moving(0, JointAffine::joint(1), phi),
+            moving(1, JointAffine::fixed(-farthest), phi),
+            moving(0, JointAffine::fixed(-0.2 * farthest), phi),
+            moving(0, JointAffine::fixed(0.2 * farthest), phi),
+        ];
+        let parts = vec![part(PartKind::Rail, 3, 4), part(PartKind::Link, 2, 1), part(PartKind::Pivot, 0, 0)];
+        Linkage { anchors, parts, pen: 1 }
     }
     // No joint_extrema_on_line: phi is monotone on a whole line, r on both sides of the foot.
 }

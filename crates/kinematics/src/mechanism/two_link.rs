@@ -1,10 +1,11 @@
 //! A planar arm of two links.
 
-use drawing::{Line, Point, Vec2};
+use drawing::{Line, Point, Rect, Vec2};
 
 use super::parameters::{FromParameters, ParameterError, Parameters};
 use super::{JointKind, Mechanism, Unreachable, frame};
-use crate::{JointPos, MachineError};
+use crate::linkage::{moving, part};
+use crate::{Anchor, JointAffine, JointPos, Linkage, MachineError, PartKind};
 
 /// `q = (theta, psi)`, the **absolute** angles of the first and second link:
 ///
@@ -150,6 +151,22 @@ impl Mechanism for TwoLink {
 
     fn is_linear(&self) -> bool {
         false
+    }
+
+    /// Base, elbow and pen with the links between them.
+    fn linkage(&self, _sheet: Rect) -> Linkage {
+        let anchors = vec![
+            Anchor::Fixed(Point::ZERO),
+            moving(0, JointAffine::fixed(self.l1_mm), JointAffine::joint(0)),
+            moving(1, JointAffine::fixed(self.l2_mm), JointAffine::joint(1)),
+        ];
+        let parts = vec![
+            part(PartKind::Link, 0, 1),
+            part(PartKind::Link, 1, 2),
+            part(PartKind::Pivot, 0, 0),
+            part(PartKind::Pivot, 1, 1),
+        ];
+        Linkage { anchors, parts, pen: 2 }
     }
 
     fn as_two_link(&self) -> Option<&TwoLink> {

@@ -7,6 +7,7 @@ use compiler::{layout, scene};
 use picture::Scene;
 
 use super::convert::clean;
+use super::page;
 use crate::cli::{PictureFormat, Preview};
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
@@ -19,8 +20,17 @@ const PIXELS: u32 = 1600;
 pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
     let format = format(&arguments.output, arguments.format)?;
     let inputs = Inputs::read(&arguments.files)?;
-    let scene = match inputs.single().filter(|input| plan::file::is_plan(&input.bytes)) {
-        Some(input) => of_plan(input, arguments.machine.as_deref())?,
+    let plan = inputs.single().filter(|input| plan::file::is_plan(&input.bytes));
+    let machine = arguments.machine.as_deref();
+    if format == PictureFormat::Html {
+        let html = match plan {
+            Some(input) => page::of_plan(input, machine)?,
+            None => page::of_drawing(&inputs, arguments)?,
+        };
+        return page::write(&arguments.output, &html);
+    }
+    let scene = match plan {
+        Some(input) => of_plan(input, machine)?,
         None => of_drawing(&inputs, arguments)?,
     };
     write(&scene, &arguments.output, format)
@@ -29,6 +39,10 @@ pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
 /// A picture of a machine without a drawing.
 pub(super) fn machine(name: &str, output: &str, asked: Option<PictureFormat>) -> Result<(), Failure> {
     let format = format(output, asked)?;
+    if format == PictureFormat::Html {
+        let what = "a machine alone does not move: its picture is NAME.svg or NAME.png";
+        return Err(Failure::Usage(anyhow::anyhow!(what)));
+    }
     session::report(|report| report.inputs.push(name.to_owned()));
     write(&scene::of_machine(&machines::machine(name)?.machine), output, format)
 }
@@ -39,6 +53,7 @@ fn format(output: &str, asked: Option<PictureFormat>) -> Result<PictureFormat, F
     let by_extension = match extension.as_deref() {
         Some("svg") => Some(PictureFormat::Svg),
         Some("png") => Some(PictureFormat::Png),
+        Some("html" | "htm") => Some(PictureFormat::Html),
         _ => None,
     };
     let wrong = |what: String| Err(Failure::Usage(anyhow::anyhow!(what)));
@@ -48,13 +63,17 @@ fn format(output: &str, asked: Option<PictureFormat>) -> Result<PictureFormat, F
         }
         (Some(format), _) | (None, Some(format)) => Ok(format),
         (None, None) if output == "-" => Ok(PictureFormat::Svg),
-        (None, None) => wrong(format!("{output}: a picture is NAME.svg or NAME.png; or give --format")),
+        (None, None) => {
+            wrong(format!("{output}: a picture is NAME.svg, NAME.png or NAME.html; or give --format"))
+        }
     }
 }
 
 fn write(scene: &Scene, output: &str, format: PictureFormat) -> Result<(), Failure> {
     match format {
-        PictureFormat::Svg => output::write(output, |out| picture::scene::svg(scene, out)),
+        PictureFormat::Svg | PictureFormat::Html => {
+            output::write(output, |out| picture::scene::svg(scene, out))
+        }
         PictureFormat::Png => {
             let bytes =
                 picture::png::encode(scene, PIXELS).map_err(|error| Failure::Drawing(error.into()))?;

@@ -7,13 +7,15 @@ use anyhow::Context as _;
 use compiler::machine_file::MachineFile;
 use compiler::report::simulation::{SimulationReport, StepReport};
 use compiler::report::{Code, ErrorReport};
+use compiler::view::{Prediction, View};
 use compiler::{layout, replay, scene, simulate};
 use drawing::{Affine, Drawing, Point};
 use kinematics::{Machine, MotorPos};
-use plan::Row;
+use plan::{Header, Row};
 use simulation::{Drive, Sample, SetpointKind, StepResponse};
 use verify::Mismatch;
 
+use super::page::{self, Planned};
 use crate::cli::{Setpoints, Simulate};
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
@@ -34,6 +36,10 @@ pub(super) struct LoadedPlan {
     /// Machine mm, in the order drawn.
     pub(super) drawing: Drawing,
     pub(super) name: String,
+    /// The plan's header.
+    header: Header,
+    /// Where the plan was made here: its drawing and exact positions.
+    planned: Option<(Inputs, Planned)>,
 }
 
 impl LoadedPlan {
@@ -43,6 +49,14 @@ impl LoadedPlan {
             rows: &self.rows,
             period_us: self.period_us,
             drawing: &self.drawing,
+        }
+    }
+
+    /// The view of the plan, without a prediction.
+    fn view(&self) -> View<'_> {
+        match &self.planned {
+            Some((inputs, planned)) => planned.view(inputs, &self.machine, &self.rows, &self.drawing),
+            None => page::of_rows(&self.name, &self.machine, &self.header, &self.rows),
         }
     }
 }
@@ -61,7 +75,7 @@ pub(crate) fn run(arguments: &Simulate) -> Result<(), Failure> {
         Some(Setpoints::Interpolated) => drive.setpoints = SetpointKind::Interpolated,
     }
     let mut samples = Vec::new();
-    let keeps = kind.as_deref() == Some("csv");
+    let keeps = matches!(kind.as_deref(), Some("csv" | "html"));
     let simulated = simulate::simulate(&loaded.plan(), &drive, |sample| {
         if keeps {
             samples.push(*sample);
@@ -73,6 +87,10 @@ pub(crate) fn run(arguments: &Simulate) -> Result<(), Failure> {
     if let (Some(kind), Some(to)) = (kind.as_deref(), &arguments.output) {
         if kind == "csv" {
             output::write(to, |out| motion(out, &loaded.machine, &samples))?;
+        } else if kind == "html" {
+            let prediction = Prediction::of(&report, &samples);
+            let view = View { prediction: Some(prediction), ..loaded.view() };
+            page::write(to, &view.html())?;
         } else {
             let title = format!("{} on {}: predicted ink", loaded.name, loaded.machine.name());
             let scene = scene::of_ink(&title, simulated.lines, &loaded.drawing, &loaded.machine);
@@ -106,7 +124,8 @@ pub(crate) fn run(arguments: &Simulate) -> Result<(), Failure> {
 fn kind_of_output(arguments: &Simulate) -> Result<Option<String>, Failure> {
     let Some(to) = &arguments.output else { return Ok(None) };
     let kind = Path::new(to).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    let known: &[&str] = if arguments.step.is_some() { &["svg", "csv"] } else { &["svg", "png", "csv"] };
+    let known: &[&str] =
+        if arguments.step.is_some() { &["svg", "csv"] } else { &["svg", "png", "csv", "html"] };
     match kind {
         Some(kind) if known.contains(&kind.as_str()) => Ok(Some(kind)),
         _ => {
@@ -158,11 +177,18 @@ pub(super) fn load_drawing(
 ) -> Result<LoadedPlan, Failure> {
     let drawn = input::drawings(inputs, reading)?;
     let request = super::request(planning, reading.layout.crop, drawn.page(), &machine);
-    let compiled = super::convert::compile(inputs, drawn.drawing(), &machine, &request)?;
-    let rows = compiled.trajectory.rows().map(|row| row.row).collect();
-    let drawing = compiled.ordered().clone();
-    let name = inputs.name();
-    Ok(LoadedPlan { file, rows, period_us: request.period_us, drawing, name, machine: machine.clone() })
+    let period_us = request.period_us;
+    let mut planned = page::planned(inputs, drawn.page(), &machine, request)?;
+    Ok(LoadedPlan {
+        file,
+        rows: std::mem::take(&mut planned.rows),
+        period_us,
+        drawing: std::mem::take(&mut planned.drawn),
+        name: inputs.name(),
+        machine,
+        header: planned.header.clone(),
+        planned: Some((inputs.clone(), planned)),
+    })
 }
 
 fn load_plan(arguments: &Simulate, input: &Input) -> Result<LoadedPlan, Failure> {
@@ -184,7 +210,8 @@ fn load_plan(arguments: &Simulate, input: &Input) -> Result<LoadedPlan, Failure>
         layout::cropped(drawing, arguments.reading.layout.crop, machine.sheet())
     };
     let (name, period_us) = (input.name.clone(), header.period_us);
-    Ok(LoadedPlan { file, machine, period_us, drawing, name, rows: plan.table.rows })
+    let header = header.clone();
+    Ok(LoadedPlan { file, machine, period_us, drawing, name, rows: plan.table.rows, header, planned: None })
 }
 
 /// Writes a picture as PNG or SVG.

@@ -1,0 +1,110 @@
+//! Animated previews: pages of drawings, plans and simulations. `cargo xtask web-test` opens them in a
+//! browser.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use assert_cmd::cargo::cargo_bin;
+use tempfile::TempDir;
+
+fn run(dir: &TempDir, words: &str) -> Output {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let words = words.replace("examples/", &format!("{}/examples/", top.display()));
+    let output = Command::new(cargo_bin("plotplan")).args(words.split(' ')).current_dir(dir.path()).output();
+    output.expect("the program starts")
+}
+
+fn page(dir: &TempDir, words: &str) -> String {
+    let output = run(dir, &format!("{words} -o x.html --quiet"));
+    assert!(output.status.success(), "{words}: {}", String::from_utf8_lossy(&output.stderr));
+    fs::read_to_string(dir.path().join("x.html")).expect("a page was written")
+}
+
+/// What the page states about its plan.
+fn meta(page: &str) -> serde_json::Value {
+    let text = page.split_once("id=\"plan-meta\">").expect("a page has data").1;
+    serde_json::from_str(text.split_once("</script>").expect("which end").0).expect("in JSON")
+}
+
+fn columns(meta: &serde_json::Value) -> Vec<String> {
+    let list = meta["columns"].as_array().expect("columns").iter();
+    list.map(|column| column["name"].as_str().expect("a name").to_owned()).collect()
+}
+
+#[test]
+fn page_of_a_drawing_holds_rows_source_and_certificate() {
+    let dir = TempDir::new().unwrap();
+    for machine in ["coaxial", "corexy", "polar", "cartesian", "hbot"] {
+        let html = page(&dir, &format!("preview examples/zot.hpgl --machine {machine} --fit"));
+        let meta = meta(&html);
+        assert_eq!(meta["title"], "zot.hpgl");
+        assert_eq!(meta["machine"]["name"], machine);
+        assert_eq!(meta["certificate"]["holds"], true);
+        assert_eq!(meta["exact"], true);
+        let all = ["t", "pen", "a", "b", "deviation", "piece_row", "piece_start", "piece_length", "source"];
+        assert_eq!(columns(&meta), all);
+        assert!(html.len() < 250_000, "{} bytes", html.len());
+        assert!(
+            !html.contains("http://")
+                || html.matches("http://").count() == html.matches("http://www.w3.org/2000/svg").count()
+        );
+    }
+}
+
+#[test]
+fn page_is_the_same_every_time_and_knows_no_path() {
+    let dir = TempDir::new().unwrap();
+    let words = "preview examples/rings.svg --machine corexy --align center";
+    let first = page(&dir, words);
+    assert_eq!(first, page(&dir, words));
+    assert!(!first.contains(env!("CARGO_MANIFEST_DIR")));
+    let meta = meta(&first);
+    let codes: Vec<&str> =
+        meta["diagnostics"].as_array().unwrap().iter().map(|found| found["code"].as_str().unwrap()).collect();
+    assert_eq!(codes, ["S0208", "S0220"]);
+    assert!(meta["diagnostics"][0]["start"].is_u64());
+    assert_eq!(meta["pens"][0]["color"], "#c03028");
+}
+
+#[test]
+fn page_of_a_plan_has_motion_and_no_source() {
+    let dir = TempDir::new().unwrap();
+    for format in ["ticks", "csv", "json"] {
+        let made =
+            run(&dir, &format!("convert examples/zot.hpgl --machine coaxial --format {format} -o plan -q"));
+        assert!(made.status.success());
+        let meta = meta(&page(&dir, "preview plan"));
+        assert_eq!(columns(&meta), ["t", "pen", "a", "b"]);
+        assert_eq!(
+            (meta["exact"].as_bool(), meta["certificate"]["holds"].as_bool()),
+            (Some(false), Some(true))
+        );
+        assert!(meta["certificate"]["after_rounding"].is_null());
+    }
+}
+
+#[test]
+fn page_of_a_simulation_has_the_predicted_motion() {
+    let dir = TempDir::new().unwrap();
+    let meta = meta(&page(&dir, "simulate examples/zot.hpgl --machine coaxial"));
+    let names = columns(&meta);
+    for name in ["deviation", "source", "predicted_t", "predicted_pen", "predicted_a", "predicted_b"] {
+        assert!(names.iter().any(|other| other == name), "{name}");
+    }
+    assert!(meta["prediction"]["sentences"][0].as_str().unwrap().starts_with("Predicted ink to drawing"));
+}
+
+#[test]
+fn page_needs_a_machine_that_moves() {
+    let dir = TempDir::new().unwrap();
+    for (words, message) in [
+        ("preview examples/zot.hpgl -o x.html", "which machine draws it?"),
+        ("machine preview corexy -o x.html", "a machine alone does not move"),
+    ] {
+        let output = run(&dir, words);
+        assert_eq!(output.status.code(), Some(2), "{words}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains(message), "{words}");
+    }
+    assert!(!dir.path().join("x.html").exists());
+}

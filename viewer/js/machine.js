@@ -1,0 +1,85 @@
+// The machine as geometry: from ticks to joints, and from joints to the points of its links.
+
+/**
+ * An affine function of the two joints.
+ * @typedef {[number, number, number]} Affine  constant, factor of joint 0, factor of joint 1
+ */
+/**
+ * A point of the machine: fixed, or at a distance and direction from an earlier point.
+ * @typedef {{x: number, y: number} | {from: number, length_mm: Affine, angle_rad: Affine}} Anchor
+ */
+/**
+ * @typedef {object} Part
+ * @property {"rail" | "link" | "pivot"} kind
+ * @property {number} from  index of a point
+ * @property {number} to
+ */
+/**
+ * @typedef {object} Machine
+ * @property {string} name
+ * @property {string} kind
+ * @property {[number, number, number, number]} sheet_mm  x0, y0, x1, y1
+ * @property {number[][]} reach_mm  closed outlines, x and y in turn
+ * @property {[[number, number], [number, number]]} joints_per_tick
+ * @property {[number, number]} offset_ticks
+ * @property {{anchors: Anchor[], parts: Part[], pen: number}} linkage
+ * @property {{name: string, kind: "revolute" | "prismatic"}[]} joints
+ * @property {{name: string, speed: number, acceleration: number, jerk: number | null}[]} motors
+ * @property {{speed_mm_s: number, travel_speed_mm_s: number | null, lift_s: number, drop_s: number}} pen
+ */
+
+/** @param {Affine} f @param {number} q0 @param {number} q1 */
+function affine(f, q0, q1) {
+  return f[0] + f[1] * q0 + f[2] * q1;
+}
+
+/**
+ * A function from motor positions, ticks, to joints.
+ * @param {Machine} machine @returns {(a: number, b: number) => [number, number]}
+ */
+export function joints(machine) {
+  const [[m00, m01], [m10, m11]] = machine.joints_per_tick;
+  const [o0, o1] = machine.offset_ticks;
+  return (a, b) => {
+    const [u, v] = [a - o0, b - o1];
+    return [m00 * u + m01 * v, m10 * u + m11 * v];
+  };
+}
+
+/**
+ * The points of the machine at motor positions, machine mm: x and y in turn.
+ * @param {Machine} machine @returns {(a: number, b: number) => Float64Array}
+ */
+export function pose(machine) {
+  const toJoints = joints(machine);
+  const anchors = machine.linkage.anchors;
+  const points = new Float64Array(2 * anchors.length);
+  return (a, b) => {
+    const [q0, q1] = toJoints(a, b);
+    anchors.forEach((anchor, k) => {
+      if ("x" in anchor) {
+        points[2 * k] = anchor.x;
+        points[2 * k + 1] = anchor.y;
+      } else {
+        const length = affine(anchor.length_mm, q0, q1);
+        const angle = affine(anchor.angle_rad, q0, q1);
+        points[2 * k] = points[2 * anchor.from] + length * Math.cos(angle);
+        points[2 * k + 1] = points[2 * anchor.from + 1] + length * Math.sin(angle);
+      }
+    });
+    return points;
+  };
+}
+
+/**
+ * The pen at motor positions, without allocation: `out[at]` is x, `out[at + 1]` y; machine mm.
+ * @param {Machine} machine
+ */
+export function pen(machine) {
+  const at = pose(machine);
+  const index = 2 * machine.linkage.pen;
+  return (/** @type {number} */ a, /** @type {number} */ b) => {
+    const points = at(a, b);
+    return [points[index], points[index + 1]];
+  };
+}
