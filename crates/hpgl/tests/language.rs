@@ -114,7 +114,7 @@ fn national_character_sets() {
         (31, "$@[\\]^`{|}~", "¤ÉÄÖÅÜéäöåü"),
         (32, "[\\]{|}", "ÆØÅæøå"),
         (33, "@[\\]{|}~", "§ÄÖÜäöüß"),
-        (34, "#@[\\]`{|}~", "£à°ç§µéùè¨"),
+        (34, "#@[\\]`{|}~", "£à°ç§`éùè¨"),
         (35, "#$@", "£$@"),
         (36, "#@[\\]`{|}~", "£§°çéùàòèì"),
         (37, "#@[\\]{|}", "£§¡Ñ¿°ñç"),
@@ -123,10 +123,39 @@ fn national_character_sets() {
     ] {
         assert_eq!(label(set, bytes), latin(characters), "CS{set}");
     }
-    // Sets without a source for their characters are reported by name.
-    let french = document(b"IN;SP1;CS2;LBa\x03");
+    // Sets that cannot be drawn are reported by name.
+    let katakana = document(b"IN;SP1;CS8;LBa\x03");
     assert_eq!(
-        french.diagnostics[0].message,
-        "character set 2 (French/German) is not built in; ISO 8859-1 is taken"
+        katakana.diagnostics[0].message,
+        "character set 8 (Katakana) is not built in; ISO 8859-1 is taken"
     );
+}
+
+#[test]
+fn hp_character_sets_put_accents_on_the_character_before() {
+    let label = |set: u8, text: &str| {
+        let document = document(format!("IN;SP1;CS{set};LB{text}\x03").as_bytes());
+        assert_eq!(document.diagnostics, [], "CS{set} {text}");
+        ink(&document)
+    };
+    let latin = |text: &str| ink(&document(format!("IN;SP1;LB{text}\x03").as_bytes()));
+    for (set, bytes, characters) in [
+        (1, "\\^{|}e`n~'", "√↑π⊢→èñ'"),
+        (2, "#\\e'e`e^u}U{A|~a[", "£çéèêüÜÅ'a["),
+        (3, "#[\\]^A{A|a}a~", "£ØÆøæÄÅäå"),
+        (4, "#\\e'N|n~a", "¿¡éÑña"),
+    ] {
+        assert_eq!(label(set, bytes), latin(characters), "CS{set}");
+    }
+    // Marks without a letter of their own: the line under `ab` ends below the pen, which moves on by
+    // two characters only.
+    let plain = latin("ab!");
+    let underlined = label(2, "a_b_!");
+    assert_eq!(underlined.len(), plain.len() + 2);
+    assert_eq!(underlined.last(), plain.last());
+    // A tilde over two letters, one stroke more.
+    assert_eq!(label(4, "ll}").len(), latin("ll").len() + 1);
+    // Centred labels count letters, not marks.
+    let centred = |text: &str| ink(&document(format!("IN;SP1;LO5;CS2;LB{text}\x03").as_bytes()));
+    assert_eq!(centred("cafe'"), centred("caf\u{e9}"));
 }

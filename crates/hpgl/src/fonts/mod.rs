@@ -3,7 +3,7 @@
 mod encodings;
 mod newstroke;
 
-pub(crate) use encodings::CharacterSet;
+pub(crate) use encodings::{CharacterSet, Mark, compose};
 
 /// Height of capitals, units of the font.
 pub const CAP_HEIGHT: f64 = 21.0;
@@ -26,6 +26,12 @@ impl Glyph {
         let index = glyphs.binary_search_by_key(&character, |glyph| glyph.0).ok()?;
         let (_, advance, strokes) = glyphs[index];
         Some(Self { advance: f64::from(advance), strokes })
+    }
+
+    /// The lowest and the highest of its ink; 0 for a blank.
+    pub(crate) fn vertical_extent(self) -> (f64, f64) {
+        let y = || self.strokes().flatten().map(|point| point.1);
+        y().reduce(f64::min).zip(y().reduce(f64::max)).unwrap_or_default()
     }
 
     /// The middle of its ink; the origin for a blank.

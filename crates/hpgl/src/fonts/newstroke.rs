@@ -3,7 +3,8 @@
 //! Taken from the crate `vector-text-newstroke` 0.1.1: the Latin alphabets, Greek letters, and the signs of the character sets
 //! that plotters knew. Each row has a character, its advance, and its strokes: a blank lifts the pen, every other
 //! pair of bytes is a point, `R` standing for 0. Capitals are 21 units high, the base line is at y = 0. Side bearings of
-//! letters beyond 5 units, as composed letters have them there, are cut to 5.
+//! letters beyond 5 units, as composed letters have them there, are cut to 5. `⊢` of the HP 9825 is not in the font and
+//! was drawn for this project.
 
 /// The glyphs in the order of their characters.
 #[rustfmt::skip]
@@ -403,6 +404,7 @@ pub(super) const GLYPHS: &[(char, i8, &str)] = &[
     ('≡', 26, "WTgT WZgZ W`g`"),
     ('≤', 26, "gSWS gWW]gc"),
     ('≥', 26, "WSgS WWg]Wc"),
+    ('⊢', 22, "WRWg W]c]"),
     ('⌀', 26, r"]babe`g\gXeTaR]RYTWXW\Y`]b gbWR"),
     ('⌐', 26, r"g\W\WW"),
     ('⌠', 20, r"\K\`]d^f`gbfcd"),

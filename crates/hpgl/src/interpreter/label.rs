@@ -5,7 +5,7 @@ use drawing::{Point, Span, Vec2};
 use super::Interpreter;
 use super::characters::{CELL, Shape};
 use crate::codes;
-use crate::fonts::{BODY_WIDTH, CAP_HEIGHT, Glyph};
+use crate::fonts::{BODY_WIDTH, CAP_HEIGHT, Glyph, Mark, compose};
 
 /// The grid that `UC` draws on: units in a character's width and height. A cell has 6 by 16 of
 /// them.
@@ -15,6 +15,11 @@ const GRID: Vec2 = Vec2::new(4.0, 8.0);
 const PEN_CONTROL: f64 = 99.0;
 /// Cells from one tabulator to the next.
 const TABULATOR: f64 = 8.0;
+
+/// Space between a character and a mark above it, units of the font.
+const MARK_GAP: f64 = 3.0;
+/// Height of small letters, units of the font.
+const SMALL_LETTER: f64 = 14.0;
 
 /// A character of a label and where it stands in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +62,7 @@ impl Interpreter {
                 character,
                 span: Span { start: start + at, end: start + at + character.len_utf8() },
             };
-            return text.char_indices().map(letter).collect();
+            return composed(text.char_indices().map(letter).collect());
         }
         let mut letters = Vec::with_capacity(text.len());
         for (at, &byte) in text.iter().enumerate() {
@@ -78,7 +83,7 @@ impl Interpreter {
                 }
             }
         }
-        letters
+        composed(letters)
     }
 
     fn is_proportional(&self) -> bool {
@@ -131,7 +136,8 @@ impl Interpreter {
         };
         let cell = f64::from((origin % 10).clamp(1, 9) - 1);
         let (column, row) = ((cell / 3.0).floor(), cell % 3.0);
-        let printing = || line.iter().filter(|letter| letter.character >= ' ');
+        let printing =
+            || line.iter().filter(|letter| letter.character >= ' ' && Mark::of(letter.character).is_none());
         let last = printing().next_back().map_or(' ', |letter| letter.character);
         let (width, height) = match self.characters.path {
             0 | 2 => {
@@ -161,6 +167,7 @@ impl Interpreter {
     fn line_of_text(&mut self, line: &[Letter], shape: &Shape) {
         let shift = self.justification(line, shape);
         self.set_pen_position(self.position + shift);
+        let mut before = ' ';
         for letter in line {
             match letter.character {
                 '\n' => {
@@ -176,7 +183,12 @@ impl Interpreter {
                 // Other control characters print nothing and do not advance.
                 '\0'..='\u{1f}' => {}
                 character => {
+                    if let Some(mark) = Mark::of(character) {
+                        self.mark(mark, before, shape);
+                        continue;
+                    }
                     self.letter(*letter, shape);
+                    before = character;
                     let step = self.advance_step(character, shape);
                     self.set_pen_position(self.position + step);
                 }
@@ -210,6 +222,24 @@ impl Interpreter {
         // letters stay apart.
         let shift = if self.is_proportional() { 0.0 } else { 0.5 * (BODY_WIDTH - glyph.advance) };
         self.glyph(glyph, shape, self.position, shift, 0.0);
+    }
+
+    /// Draws a mark on the character before the pen, which stays where it is.
+    fn mark(&mut self, mark: Mark, before: char, shape: &Shape) {
+        let Some(glyph) = Glyph::of(mark.sign) else { return };
+        let step = self.advance_step(before, shape);
+        let origin = self.position - step;
+        let shift_x = 0.5 * (BODY_WIDTH - glyph.advance);
+        // A mark over two characters stands in the middle of them.
+        let origin = origin - 0.5 * f64::from(mark.width - 1) * step;
+        let shift_y = if mark.above {
+            // As high as small letters at least: a mark after a blank stands there too.
+            let top = Glyph::of(before).map_or(0.0, |glyph| glyph.vertical_extent().1).max(SMALL_LETTER);
+            top + MARK_GAP - glyph.vertical_extent().0
+        } else {
+            0.0
+        };
+        self.glyph(glyph, shape, origin, shift_x, shift_y);
     }
 
     /// Draws a glyph with its origin at a position, offset in units of the font.
@@ -278,7 +308,7 @@ impl Interpreter {
     pub(super) fn symbol_mode(&mut self, text: &[u8], start: usize) {
         let letter = self.letters(text, start).into_iter().next();
         self.symbol = letter.and_then(|letter| {
-            let glyph = Glyph::of(letter.character);
+            let glyph = Glyph::of(Mark::of(letter.character).map_or(letter.character, |mark| mark.sign));
             if glyph.is_none() {
                 let character = letter.character;
                 self.report_at(codes::UNKNOWN_CHARACTER, letter.span, || {
@@ -343,4 +373,21 @@ impl Interpreter {
         }
         self.label_end = Some(self.position);
     }
+}
+
+/// Letters and the marks after them as the letters that the font has for both.
+fn composed(letters: Vec<Letter>) -> Vec<Letter> {
+    if letters.iter().all(|letter| Mark::of(letter.character).is_none()) {
+        return letters;
+    }
+    let mut result: Vec<Letter> = Vec::with_capacity(letters.len());
+    for letter in letters {
+        let with_mark = result.last().and_then(|last| compose(last.character, letter.character));
+        if let Some((last, character)) = result.last_mut().zip(with_mark) {
+            *last = Letter { character, span: Span { start: last.span.start, end: letter.span.end } };
+        } else {
+            result.push(letter);
+        }
+    }
+    result
 }
