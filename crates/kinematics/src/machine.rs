@@ -426,6 +426,10 @@ impl Machine {
     /// # Errors
     /// When no pose reaches the point.
     pub fn pose_near(&self, p: Point, near: &JointPos) -> Result<JointPos, Unreachable> {
+        if self.parts.mechanism.pole() == Some(p) {
+            // Every direction will do.
+            return Ok(JointPos::new(near[0], 0.0));
+        }
         let q = self.parts.mechanism.inverse(p)?;
         Ok(match self.parts.mechanism.full_rotation() {
             Some(rotation) => q + rotation * ((near[0] - q[0]) / rotation[0]).round(),

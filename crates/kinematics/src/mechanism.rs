@@ -121,6 +121,12 @@ pub trait Mechanism: Debug + Send + Sync {
     /// one: the base of an arm.
     fn base(&self) -> Option<Point>;
 
+    /// A point that the pen can hold in every direction of the first joint, with the second one at 0,
+    /// if there is one. Only lines that end there can be drawn near it: the first joint rests on them.
+    fn pole(&self) -> Option<Point> {
+        None
+    }
+
     /// Whether the pen's position is an affine function of the joints, so that its derivatives along
     /// a path are proportional to the joints'.
     fn is_linear(&self) -> bool;

@@ -55,15 +55,15 @@ impl std::fmt::Display for Fault {
                 f,
                 "the arm would have to fold completely, so that no line can pass through this point"
             ),
-            Self::TooFar(by) => write!(f, "it is {by:.2} mm beyond the machine's reach"),
+            Self::TooFar(by) => write!(f, "it is {} mm beyond the machine's reach", readable(by)),
             Self::TooNear(by) => write!(f, "it is {by:.2} mm too near to the machine's base"),
             Self::JointLimit { joint, kind, value, min, max } => {
                 let (scale, unit) = match kind {
                     JointKind::Revolute => (180.0 / std::f64::consts::PI, "deg"),
                     JointKind::Prismatic => (1.0, "mm"),
                 };
-                let (value, min, max) = (value * scale, min * scale, max * scale);
-                write!(f, "joint {joint} would be {value:.2} {unit} (range {min:.2} to {max:.2} {unit})")
+                let (value, min, max) = (readable(value * scale), min * scale, max * scale);
+                write!(f, "joint {joint} would be {value} {unit} (range {min:.2} to {max:.2} {unit})")
             }
             Self::Singular { manipulability, min } => write!(
                 f,
@@ -76,12 +76,17 @@ impl std::fmt::Display for Fault {
 
 /// A point at which a machine cannot draw.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the point {:.2}, {:.2} mm cannot be drawn: {fault}", point.x, point.y)]
+#[error("the point {}, {} mm cannot be drawn: {fault}", readable(point.x), readable(point.y))]
 pub struct OutOfReach {
     /// The point, machine mm.
     pub point: Point,
     /// Why.
     pub fault: Fault,
+}
+
+/// A number with two digits after the point, or with a power of ten where it is huge.
+fn readable(number: f64) -> String {
+    if number.abs() < 1e7 { format!("{number:.2}") } else { format!("{number:.2e}") }
 }
 
 /// Curves are checked as chords within this distance, mm: far below any machine's tick.
@@ -102,7 +107,9 @@ impl Machine {
                 let limit = self.joint_fault(&q).and_then(|_| self.poses(p, &self.start()).err());
                 let (manipulability, min) =
                     (self.mechanism().manipulability(&q), self.parts().min_manipulability);
-                limit.or_else(|| (manipulability < min).then_some(Fault::Singular { manipulability, min }))
+                // At the pole itself the pen may rest, whatever the direction.
+                let singular = manipulability < min && self.mechanism().pole() != Some(p);
+                limit.or_else(|| singular.then_some(Fault::Singular { manipulability, min }))
             }
         };
         fault.map_or(Ok(()), |fault| Err(OutOfReach { point: p, fault }))
@@ -115,23 +122,80 @@ impl Machine {
     /// from the base. Joints are monotone between these points and those of
     /// [`crate::Mechanism::joint_extrema_on_line`]. Curves are checked as chords within 1e-3 mm.
     ///
+    /// A line through [`crate::Mechanism::pole`] is two lines that end there: the planner stops there
+    /// with the pen up ([`Self::pole_on`]). On such a line the first joint rests at any distance.
+    ///
     /// # Errors
     /// With an offending point.
     pub fn check_segment(&self, segment: &Segment) -> Result<(), OutOfReach> {
         match segment {
-            Segment::Line(line) => self.check_line(line),
+            Segment::Line(line) => match self.pole_on(line) {
+                Some(pole) => {
+                    self.check_radius(pole, line.p0)?;
+                    self.check_radius(pole, line.p1)
+                }
+                None => self.check_line(line),
+            },
             curve => {
                 let mut from = curve.start();
                 let mut result = Ok(());
                 curve.flatten(CHORD_TOLERANCE, |to| {
+                    let chord = Line::new(from, to);
+                    if let (Ok(()), Some(pole)) = (result, self.pole_on(&chord)) {
+                        // A curve leaves its tangent, and the first joint would turn.
+                        let min = self.parts().min_manipulability;
+                        let fault = Fault::Singular { manipulability: 0.0, min };
+                        result = Err(OutOfReach { point: pole, fault });
+                    }
                     if result.is_ok() {
-                        result = self.check_line(&Line::new(from, to));
+                        result = self.check_line(&chord);
                     }
                     from = to;
                 });
                 result
             }
         }
+    }
+
+    /// The pole, if the line goes through it or ends there, to within 1e-6 mm.
+    pub fn pole_on(&self, line: &Line) -> Option<Point> {
+        let pole = self.mechanism().pole()?;
+        let along = line.p1 - line.p0;
+        let length_2 = along.hypot2();
+        let t = if length_2 > 0.0 { ((pole - line.p0).dot(along) / length_2).clamp(0.0, 1.0) } else { 0.0 };
+        ((at(line, t) - pole).hypot2() <= AT_POLE * AT_POLE).then_some(pole)
+    }
+
+    /// The poses at the pole from which the pen can draw a straight line to `towards`, in the order of
+    /// [`Self::poses`].
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn poses_at_pole(&self, towards: Point, near: &JointPos) -> Result<Vec<JointPos>, Fault> {
+        let outer = self.poses(towards, near)?;
+        let poses = outer.into_iter().map(|pose| JointPos::new(pose[0], 0.0));
+        let mut fault = None;
+        let allowed: Vec<JointPos> = poses
+            .filter(|pose| {
+                let found = self.joint_fault(pose);
+                fault = fault.or(found);
+                found.is_none()
+            })
+            .collect();
+        match fault {
+            Some(fault) if allowed.is_empty() => Err(fault),
+            _ => Ok(allowed),
+        }
+    }
+
+    /// Whether the pen may draw between the pole and a point: its joints are allowed at both ends.
+    fn check_radius(&self, pole: Point, to: Point) -> Result<(), OutOfReach> {
+        if (to - pole).hypot2() <= AT_POLE * AT_POLE {
+            return self.check_point(pole);
+        }
+        self.poses(to, &self.start()).map_err(|fault| OutOfReach { point: to, fault })?;
+        let at_pole = self.poses_at_pole(to, &self.start());
+        at_pole.map(|_| ()).map_err(|fault| OutOfReach { point: pole, fault })
     }
 
     fn check_line(&self, line: &Line) -> Result<(), OutOfReach> {
@@ -194,6 +258,9 @@ impl Machine {
         Turns { t, pose, allowed }
     }
 }
+
+/// Points within this distance of the pole are at the pole, mm: rounding errors of placement.
+const AT_POLE: f64 = 1e-6;
 
 /// The full rotations about the base that are tried on either side of a pose.
 const MOST_TURNS: i32 = 4;

@@ -1,7 +1,7 @@
 //! Planning of one stroke: the pose it starts from, and the motion along it.
 
 use drawing::{Point, Stroke};
-use kinematics::{JointPos, Machine, OutOfReach, Unreachable};
+use kinematics::{Fault, JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
     joint_path::{JointPath, PathGeometry},
@@ -70,7 +70,7 @@ impl StrokePlanner<'_> {
     ) -> Result<PlannedStroke, OutOfReach> {
         let start = stroke.start();
         self.machine.check_point(start)?;
-        let poses = self.machine.poses(start, near).map_err(|fault| OutOfReach { point: start, fault })?;
+        let poses = self.start_poses(stroke, near).map_err(|fault| OutOfReach { point: start, fault })?;
         let mut first_error = None;
         if let (Some(Ok(planned)), Some(pose)) = (candidate, poses.first())
             && planned.start == *pose
@@ -83,14 +83,25 @@ impl StrokePlanner<'_> {
                 Err(error) => first_error = first_error.or(Some(error)),
             }
         }
-        let fault =
-            kinematics::Fault::Singular { manipulability: 0.0, min: self.machine.parts().min_manipulability };
+        let fault = Fault::Singular { manipulability: 0.0, min: self.machine.parts().min_manipulability };
         Err(first_error.unwrap_or(OutOfReach { point: start, fault }))
+    }
+
+    /// The poses a stroke can start from, in order of distance from `near`. At a pole it starts in the
+    /// direction of its first line.
+    fn start_poses(&self, stroke: &Stroke, near: &JointPos) -> Result<Vec<JointPos>, Fault> {
+        let start = stroke.start();
+        match stroke.segments().next() {
+            Some(first) if self.machine.mechanism().pole() == Some(start) => {
+                self.machine.poses_at_pole(first.end(), near)
+            }
+            _ => self.machine.poses(start, near),
+        }
     }
 
     /// Predicts the poses in which a stroke starts and ends if the machine arrives near `near`.
     pub(crate) fn predict_poses(&self, stroke: &Stroke, near: &JointPos) -> Option<(JointPos, JointPos)> {
-        let pose = *self.machine.poses(stroke.start(), near).ok()?.first()?;
+        let pose = *self.start_poses(stroke, near).ok()?.first()?;
         let mut end = pose;
         for vertex in stroke.vertices().iter() {
             end = self.machine.pose_near(*vertex, &end).ok()?;

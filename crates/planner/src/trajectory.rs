@@ -8,7 +8,7 @@
 use std::borrow::Cow;
 use std::collections::VecDeque;
 
-use drawing::{Drawing, Stroke};
+use drawing::{Drawing, Line, Segment, Stroke};
 use kinematics::{JointPos, Machine, OutOfReach};
 use plan::Row;
 use rayon::prelude::*;
@@ -104,6 +104,44 @@ pub fn plan<'a>(
     plan_with_progress(machine, drawing, settings, &|_, _| {})
 }
 
+/// The strokes, divided where they go through a pole of the machine. The pen is lifted there while the
+/// mechanism turns; on the lines to and from the pole its first joint rests.
+fn divided_at_pole(machine: &Machine, mut drawing: Drawing) -> Drawing {
+    if machine.mechanism().pole().is_none() {
+        return drawing;
+    }
+    let strokes = std::mem::take(&mut drawing.strokes);
+    for stroke in strokes {
+        let on_pole = |segment: &Segment| match segment {
+            Segment::Line(line) => machine.pole_on(line),
+            _ => None,
+        };
+        if stroke.segments().all(|segment| on_pole(&segment).is_none()) {
+            drawing.strokes.push(stroke);
+            continue;
+        }
+        let at_pole = |point| machine.pole_on(&Line::new(point, point)).is_some();
+        let mut part = Stroke::new(stroke.pen, stroke.start(), stroke.source());
+        for segment in stroke.segments() {
+            let Some(pole) = on_pole(&segment) else {
+                part.push(segment);
+                continue;
+            };
+            if !at_pole(part.end()) {
+                part.line_to(pole);
+            }
+            let after = Stroke::new(stroke.pen, pole, stroke.source());
+            let before = std::mem::replace(&mut part, after);
+            drawing.strokes.extend((!before.is_dot()).then_some(before));
+            if !at_pole(segment.end()) {
+                part.line_to(segment.end());
+            }
+        }
+        drawing.strokes.extend((!part.is_dot()).then_some(part));
+    }
+    drawing
+}
+
 /// As [`plan()`]; `progress` is called with the strokes planned and all strokes, after each batch.
 ///
 /// # Errors
@@ -118,6 +156,7 @@ pub fn plan_with_progress<'a>(
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
     }
+    let drawing = divided_at_pole(machine, drawing);
     let trajectory = Trajectory {
         machine,
         budget: ToleranceBudget::of(machine, settings, &drawing),

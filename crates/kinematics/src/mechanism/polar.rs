@@ -16,7 +16,8 @@ use crate::{Anchor, JointAffine, JointPos, Linkage, PartKind};
 /// phi''' = (j.t - phi' a.e - 3 r' phi'' - 2 r'' phi') / r
 /// r''' = j.e + phi' a.t + r' phi'^2 + 2 r phi' phi''
 /// ```
-/// Singular at the pole. Source: differentiating the definition; the report of the polar machine
+/// Singular at the pole, but on lines that end there: phi rests on them, so that its derivatives are
+/// taken as 0 at r = 0, where the formulas are 0 / 0. Source: differentiating the definition; the report of the polar machine
 /// (docs/references.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Polar;
@@ -50,6 +51,9 @@ impl Mechanism for Polar {
 
     fn path_derivatives(&self, q: &JointPos, first: Vec2, second: Vec2) -> (JointPos, JointPos) {
         let ((e, t), r) = (frame(q[0]), q[1]);
+        if r == 0.0 {
+            return (JointPos::new(0.0, first.dot(e)), JointPos::new(0.0, second.dot(e)));
+        }
         let (phi_1, r_1) = (first.dot(t) / r, first.dot(e));
         let phi_2 = (second.dot(t) - 2.0 * r_1 * phi_1) / r;
         let r_2 = second.dot(e) + r * phi_1 * phi_1;
@@ -58,6 +62,9 @@ impl Mechanism for Polar {
 
     fn path_third_derivative(&self, q: &JointPos, first: Vec2, second: Vec2, third: Vec2) -> JointPos {
         let ((e, t), r) = (frame(q[0]), q[1]);
+        if r == 0.0 {
+            return JointPos::new(0.0, third.dot(e));
+        }
         let (rates, turns) = self.path_derivatives(q, first, second);
         let ((phi_1, r_1), (phi_2, r_2)) = ((rates[0], rates[1]), (turns[0], turns[1]));
         let phi_3 = (third.dot(t) - phi_1 * second.dot(e) - 3.0 * r_1 * phi_2 - 2.0 * r_2 * phi_1) / r;
@@ -76,7 +83,7 @@ impl Mechanism for Polar {
         (q[1].abs() / 10.0).min(1.0)
     }
 
-    /// The pen draws no nearer to the pole than 1 mm.
+    /// The pen draws no nearer to the pole than 1 mm, but on lines that end there.
     fn default_min_manipulability(&self) -> f64 {
         0.1
     }
@@ -86,6 +93,10 @@ impl Mechanism for Polar {
     }
 
     fn base(&self) -> Option<Point> {
+        Some(Point::ZERO)
+    }
+
+    fn pole(&self) -> Option<Point> {
         Some(Point::ZERO)
     }
 
