@@ -33,6 +33,7 @@ mod cost;
 mod dedupe;
 mod merge;
 mod options;
+mod progress;
 mod report;
 mod seam;
 mod search;
@@ -45,6 +46,7 @@ pub use dedupe::without_duplicates;
 /// The distance in the plane, mm: the [`Cost`] without a machine.
 pub use drawing::distance;
 pub use options::Options;
+use progress::Progress;
 pub use report::Report;
 use search::{End, Problem};
 
@@ -54,6 +56,16 @@ use search::{End, Problem};
 /// segments are drawn with the same pens, each forwards or backwards. The cost of travel is never
 /// higher than in file order with the pens grouped. If the cost is not finite, file order is kept.
 pub fn optimize(drawing: Drawing, cost: &dyn Cost, options: &Options) -> (Drawing, Report) {
+    optimize_with_progress(drawing, cost, options, &|_| {})
+}
+
+/// As [`optimize()`]; `progress` is called now and then with the share of the search that is done.
+pub fn optimize_with_progress(
+    drawing: Drawing,
+    cost: &dyn Cost,
+    options: &Options,
+    progress: &dyn Fn(f64),
+) -> (Drawing, Report) {
     let strokes_before = drawing.strokes.len();
     let (travel_cost_before, travel_mm_before) = report::travel(&drawing.strokes, cost, options);
     let mut pens = by_pen(drawing.strokes, options.pen_order.as_deref());
@@ -65,7 +77,7 @@ pub fn optimize(drawing: Drawing, cost: &dyn Cost, options: &Options) -> (Drawin
     if options.merge {
         pens = pens.into_iter().map(|strokes| merge::merge(strokes, options.keep_direction)).collect();
     }
-    let ordered = search_each_pen(pens, cost, options);
+    let ordered = search_each_pen(pens, cost, options, Progress::new(progress));
 
     let (limit, _) = report::travel(&in_file_order, cost, options);
     let (found, _) = report::travel(&ordered, cost, options);
@@ -101,22 +113,36 @@ fn by_pen(strokes: Vec<Stroke>, pen_order: Option<&[Pen]>) -> Vec<Vec<Stroke>> {
     groups
 }
 
+/// The share of the first of two searches of a pen's strokes: eight times the work of the second.
+const FIRST_SEARCH: f64 = 0.9;
+
 /// Orders the strokes of each pen separately, starting where the previous pen ended.
-fn search_each_pen(pens: Vec<Vec<Stroke>>, cost: &dyn Cost, options: &Options) -> Vec<Stroke> {
+fn search_each_pen(
+    pens: Vec<Vec<Stroke>>,
+    cost: &dyn Cost,
+    options: &Options,
+    progress: Progress<'_>,
+) -> Vec<Stroke> {
     let mut ordered: Vec<Stroke> = Vec::new();
     let last = pens.len().saturating_sub(1);
-    let all = pens.iter().map(Vec::len).sum();
+    let all: usize = pens.iter().map(Vec::len).sum();
+    let mut before = 0.0;
     for (at, strokes) in pens.into_iter().enumerate() {
         let start = ordered.last().map_or(options.start, |stroke| Some(stroke.end()));
         let park = if at == last { options.park } else { None };
-        let mut strokes = search(strokes, start, park, cost, options, (options.effort, all));
+        let after = before + strokes.len() as f64 / all as f64;
+        let progress = progress.part(before, after);
+        before = after;
+        let first = progress.part(0.0, FIRST_SEARCH);
+        let mut strokes = search(strokes, start, park, cost, options, (options.effort, all), first);
         // New start points of closed strokes may make another order better.
         let choose = |strokes: &mut [Stroke]| {
             let turned = seam::turn_circles(strokes, start, park, cost);
             seam::choose_seams(strokes, start, park, cost) || turned
         };
         if choose(&mut strokes) {
-            strokes = search(strokes, start, park, cost, options, (options.effort.min(1), all));
+            let second = progress.part(FIRST_SEARCH, 1.0);
+            strokes = search(strokes, start, park, cost, options, (options.effort.min(1), all), second);
             choose(&mut strokes);
         }
         ordered.append(&mut strokes);
@@ -133,10 +159,11 @@ fn search(
     cost: &dyn Cost,
     options: &Options,
     effort: (u8, usize),
+    progress: Progress<'_>,
 ) -> Vec<Stroke> {
     let ends = strokes.iter().map(|stroke| [stroke.start(), stroke.end()]);
     let problem = Problem::new(ends, start, park, options.keep_direction, cost);
-    let tour = search::solve(&problem, effort);
+    let tour = search::solve(&problem, effort, progress);
     in_order_of(strokes, &tour)
 }
 

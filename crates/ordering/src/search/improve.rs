@@ -47,6 +47,9 @@ pub(crate) struct Search<'p> {
     work: u64,
 }
 
+/// Kicks from one report of progress to the next: some milliseconds.
+const KICKS_BETWEEN_REPORTS: u32 = 4096;
+
 impl<'p> Search<'p> {
     /// Work of `new` an end.
     const WORK_OF_END: u64 = 40;
@@ -110,7 +113,7 @@ impl<'p> Search<'p> {
     ///
     /// A kick is a double bridge of short segments at a random position (Martin, Otto and Felten
     /// 1991; local form: Applegate, Cook and Rohe 2003). The search continues at its six ends only.
-    pub(crate) fn kick(&mut self, work: u64, random: &mut Random) {
+    pub(crate) fn kick(&mut self, work: u64, random: &mut Random, progress: impl Fn(f64)) {
         let n = self.tour.len();
         if n < 4 {
             return;
@@ -119,7 +122,13 @@ impl<'p> Search<'p> {
         let cheapest = self.candidates.iter().map(|&(cost, _)| cost).fold(f64::INFINITY, f64::min);
         let tolerance = TOLERANCE * (self.total / n as f64 - cheapest).max(0.0);
         let begin = self.work;
-        while self.work - begin < work {
+        for kicks in 0_u32.. {
+            if self.work - begin >= work {
+                break;
+            }
+            if kicks % KICKS_BETWEEN_REPORTS == 0 {
+                progress((self.work - begin) as f64 / work as f64);
+            }
             // The kick itself is work too, so that the loop ends.
             self.work += 10;
             let left = 1.0 - (self.work - begin) as f64 / work as f64;

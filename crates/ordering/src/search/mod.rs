@@ -9,6 +9,7 @@ mod random;
 mod tour;
 mod tree;
 
+use crate::progress::Progress;
 use contract::Contracted;
 use improve::Search;
 use orient::orient;
@@ -28,7 +29,7 @@ const SEVERAL_STARTS: usize = 3000;
 
 /// The best tour found from several starts. File order is one of them, so the result is never
 /// worse.
-pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize)) -> Vec<End> {
+pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize), progress: Progress<'_>) -> Vec<End> {
     let starts =
         [problem.file_order(), construct::nearest_neighbour(problem), construct::greedy_edge(problem)];
     let mut best = Best::new(problem, starts[0].clone());
@@ -36,15 +37,15 @@ pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize)) -> Vec<End> {
     // Several pens share the work of one drawing.
     let work = (u128::from(work_of(all, effort)) * n as u128 / all.max(n) as u128) as u64;
     if n <= SEVERAL_STARTS {
-        for start in &starts[1..] {
-            best.offer(improve(problem, start.clone(), work / 2));
+        for (start, progress) in starts[1..].iter().zip([progress.part(0.0, 0.5), progress.part(0.5, 1.0)]) {
+            best.offer(improve(problem, start.clone(), work / 2, progress));
         }
     } else {
         for start in &starts[1..] {
             best.offer(start.clone());
         }
         let start = best.tour.clone();
-        best.offer(improve(problem, start, work));
+        best.offer(improve(problem, start, work, progress));
     }
     Problem::canonical(&mut best.tour);
     best.tour
@@ -88,14 +89,17 @@ impl<'p> Best<'p> {
 /// Contraction (multilevel refinement, Walshaw 2002) finds the links between hatches: the right
 /// partner of an end at the edge of a hatch is not among its nearest ends, which all belong to the
 /// same hatch.
-fn improve(problem: &Problem, tour: Vec<End>, work: u64) -> Vec<End> {
+fn improve(problem: &Problem, tour: Vec<End>, work: u64, progress: Progress<'_>) -> Vec<End> {
     let mut random = Random::new();
     let mut best = Best::new(problem, tour);
+    let mut before = 0;
     for (contracted, share) in LEVELS {
+        let progress = progress.part(before as f64 / 1000.0, (before + share) as f64 / 1000.0);
+        before += share;
         let mut level = Contracted::new(problem, best.tour.clone(), contracted);
         let mut search = Search::new(&level.problem, level.problem.file_order());
         search.descend();
-        search.kick(work / 1000 * share, &mut random);
+        search.kick(work / 1000 * share, &mut random, |share| progress.done(share));
         let mut tour = search.finish();
         if contracted == MIRRORED.0 && !problem.one_way {
             tour = mirror(&mut level, tour, work / 1000 * MIRRORED.1, &mut random);
@@ -119,7 +123,7 @@ fn mirror(level: &mut Contracted, tour: Vec<End>, work: u64, random: &mut Random
         let increase = level.mirror(run);
         let mut search = Search::new(&level.problem, best.clone());
         search.descend();
-        search.kick(20 * runs as u64, random);
+        search.kick(20 * runs as u64, random, |_| {});
         done += search.work();
         let tour = search.finish();
         if level.problem.tour_cost(&tour) + increase <= before {
