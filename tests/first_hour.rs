@@ -1,39 +1,18 @@
 //! What new users met in their first hour with the program, as named tests.
 
 use std::fs;
-use std::process::Output;
 
-use assert_cmd::cargo::cargo_bin;
-use test_support::TestDir;
+use test_support::{Program, TestDir};
+
+const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_plotplan"));
 
 const SQUARE: &str = "IN;SP1;PU400,400;PD1200,400,1200,1200,400,1200,400,400;PU;";
 /// A square of 20 mm whose lower-left corner is at 600, 600 mm: beyond every preset.
 const FAR: &str = "IN;SP1;PU24000,24000;PD24800,24000,24800,24800,24000,24800,24000,24000;PU;";
 
-fn run(dir: &TestDir, arguments: &str) -> Output {
-    let mut command = std::process::Command::new(cargo_bin!("plotplan"));
-    command.current_dir(dir.path()).args(arguments.split_whitespace());
-    command.env("COLUMNS", "200").env("XDG_CONFIG_HOME", dir.path().join("config"));
-    command.output().expect("the program runs")
-}
-
-fn succeed(dir: &TestDir, arguments: &str) -> String {
-    let output = run(dir, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "plotplan {arguments}\n{errors}");
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn fail(dir: &TestDir, arguments: &str, code: i32) -> String {
-    let output = run(dir, arguments);
-    assert_eq!(output.status.code(), Some(code), "plotplan {arguments}");
-    assert!(output.stdout.is_empty(), "plotplan {arguments} writes to standard output");
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
 /// Bounding box of the pen-down rows of a plan on the table, mm.
 fn ink_bounds(dir: &TestDir, plan: &str) -> [f64; 4] {
-    let text = succeed(dir, &format!("info {plan}"));
+    let text = PROGRAM.stdout_of(dir, &format!("info {plan}"));
     assert!(text.contains("ink"), "{text}");
     let rows: Vec<Vec<f64>> = dir
         .text(plan)
@@ -63,7 +42,7 @@ fn assert_near(found: [f64; 4], expected: [f64; 4]) {
 fn output_never_replaces_an_input() {
     let dir = TestDir::new();
     dir.write("a.hpgl", SQUARE);
-    let machine = succeed(&dir, "machine show cartesian");
+    let machine = PROGRAM.stdout_of(&dir, "machine show cartesian");
     dir.write("m.toml", &machine);
     for command in
         ["convert a.hpgl -o a.hpgl", "convert a.hpgl -m m.toml -o m.toml", "preview a.hpgl -o link.svg"]
@@ -72,7 +51,7 @@ fn output_never_replaces_an_input() {
         if command.contains("link") {
             std::os::unix::fs::symlink("a.hpgl", dir.path().join("link.svg")).expect("a link");
         }
-        let said = fail(&dir, command, 2);
+        let said = PROGRAM.refuse(&dir, command, 2);
         assert!(said.contains("an output does not replace an input"), "{said}");
     }
     assert_eq!(dir.text("a.hpgl"), SQUARE);
@@ -84,7 +63,10 @@ fn placement_options_take_effect() {
     let dir = TestDir::new();
     dir.write("a.hpgl", SQUARE);
     let bounds = |options: &str| {
-        succeed(&dir, &format!("convert a.hpgl -m cartesian -f csv -o plan.csv --order file {options}"));
+        PROGRAM.stdout_of(
+            &dir,
+            &format!("convert a.hpgl -m cartesian -f csv -o plan.csv --order file {options}"),
+        );
         ink_bounds(&dir, "plan.csv")
     };
     assert_near(bounds(""), [10.0, 10.0, 30.0, 30.0]);
@@ -103,7 +85,10 @@ fn mirror_swaps_left_and_right() {
     let dir = TestDir::new();
     // An L: its corner is at the lower left; mirrored, at the lower right.
     dir.write("l.hpgl", "IN;SP1;PU0,1600;PD0,0,800,0;PU;");
-    succeed(&dir, "convert l.hpgl -m cartesian -f csv -o plan.csv --order file --place 50,50 --mirror x");
+    PROGRAM.stdout_of(
+        &dir,
+        "convert l.hpgl -m cartesian -f csv -o plan.csv --order file --place 50,50 --mirror x",
+    );
     let plan = dir.text("plan.csv");
     assert!(plan.contains("# placement: -1 0 0 1 70 50"), "{plan}");
 }
@@ -112,29 +97,30 @@ fn mirror_swaps_left_and_right() {
 fn far_drawing_is_offered_a_placement_at_its_size() {
     let dir = TestDir::new();
     dir.write("far.hpgl", FAR);
-    let said = fail(&dir, "convert far.hpgl -m cartesian", 1);
+    let said = PROGRAM.refuse(&dir, "convert far.hpgl -m cartesian", 1);
     assert!(said.contains("--align center puts it on the sheet at this size"), "{said}");
-    succeed(&dir, "convert far.hpgl -m cartesian --align center -o plan.ticks");
+    PROGRAM.stdout_of(&dir, "convert far.hpgl -m cartesian --align center -o plan.ticks");
     let place =
         said.split("(as --place ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a placement");
-    succeed(&dir, &format!("convert far.hpgl -m cartesian --place {place} --strict -o plan.ticks"));
+    PROGRAM.stdout_of(&dir, &format!("convert far.hpgl -m cartesian --place {place} --strict -o plan.ticks"));
 }
 
 #[test]
 fn plan_of_own_machine_needs_no_further_words() {
     let dir = TestDir::new();
     dir.write("a.hpgl", SQUARE);
-    let own =
-        succeed(&dir, "machine show cartesian").replace("name = \"cartesian\"", "name = \"lisas-table\"");
+    let own = PROGRAM
+        .stdout_of(&dir, "machine show cartesian")
+        .replace("name = \"cartesian\"", "name = \"lisas-table\"");
     fs::create_dir_all(dir.path().join("config/plotplan/machines")).expect("a folder");
     dir.write("config/plotplan/machines/lisa.toml", &own);
-    succeed(&dir, "convert a.hpgl -m lisa -o plan.ticks");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl -m lisa -o plan.ticks");
     for command in ["info plan.ticks", "verify plan.ticks -d a.hpgl", "preview plan.ticks -o plan.svg"] {
-        succeed(&dir, command);
+        PROGRAM.stdout_of(&dir, command);
     }
     // Elsewhere the message names the way out.
     fs::remove_dir_all(dir.path().join("config")).expect("the folder goes");
-    let said = fail(&dir, "info plan.ticks", 2);
+    let said = PROGRAM.refuse(&dir, "info plan.ticks", 2);
     assert!(said.contains("--machine FILE.toml"), "{said}");
 }
 
@@ -144,7 +130,7 @@ fn foreign_file_is_named_in_one_line() {
     dir.write("a.pdf", "%PDF-1.4\n1 0 obj\n<</Type/Catalog>>\nendobj\n");
     dir.write("cut.cut", "H1*G71*M70*D2*M15*X5668Y1730M31*S:XL-AN:ARKA*D2*M15*X5928Y1730*M14*X6638Y0*M0*");
     dir.write("a.gcode", "G21\nG90\nG0 X10 Y10\nG1 X20 Y20 F600\n");
-    let machine = succeed(&dir, "machine show polar");
+    let machine = PROGRAM.stdout_of(&dir, "machine show polar");
     dir.write("m.toml", machine);
     for (file, what) in [
         ("a.pdf", "a PDF document"),
@@ -153,7 +139,7 @@ fn foreign_file_is_named_in_one_line() {
         ("m.toml", "a machine file"),
     ] {
         for command in ["convert FILE -m corexy", "check FILE", "info FILE", "preview FILE -o x.svg"] {
-            let said = fail(&dir, &command.replace("FILE", file), 1);
+            let said = PROGRAM.refuse(&dir, &command.replace("FILE", file), 1);
             assert!(said.contains(what) && said.lines().count() == 1, "{said}");
         }
     }
@@ -164,10 +150,10 @@ fn foreign_file_is_named_in_one_line() {
 fn plan_is_not_taken_for_a_drawing() {
     let dir = TestDir::new();
     dir.write("a.hpgl", SQUARE);
-    succeed(&dir, "convert a.hpgl -m cartesian -o plan.ticks");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl -m cartesian -o plan.ticks");
     for command in ["check plan.ticks", "convert plan.ticks -m cartesian", "verify plan.ticks -d plan.ticks"]
     {
-        let said = fail(&dir, command, 1);
+        let said = PROGRAM.refuse(&dir, command, 1);
         assert!(said.contains("is a plan, not a drawing"), "{said}");
     }
 }
@@ -185,7 +171,7 @@ fn options_without_effect_are_refused() {
         "convert a.hpgl -m corexy --order file --effort 3",
         "check a.hpgl --tolerance 1mm",
     ] {
-        let said = fail(&dir, command, 2);
+        let said = PROGRAM.refuse(&dir, command, 2);
         assert!(said.contains("has no effect"), "plotplan {command}\n{said}");
     }
 }
@@ -197,15 +183,15 @@ fn format_follows_the_extension_of_the_output() {
     for (name, begins) in
         [("p.csv", "# plotplan: 1"), ("p.json", "{"), ("p.ticks", "; plotplan: 1"), ("p", "; plotplan: 1")]
     {
-        succeed(&dir, &format!("convert a.hpgl -m corexy -o {name}"));
+        PROGRAM.stdout_of(&dir, &format!("convert a.hpgl -m corexy -o {name}"));
         assert!(dir.text(name).starts_with(begins), "{name}");
     }
     for (name, begins) in [("p.svg", "<svg"), ("p.plt", "IN;")] {
-        succeed(&dir, &format!("convert a.hpgl -o {name}"));
+        PROGRAM.stdout_of(&dir, &format!("convert a.hpgl -o {name}"));
         assert!(dir.text(name).contains(begins), "{name}");
     }
     for command in ["convert a.hpgl -m corexy -f csv -o x.json", "convert a.hpgl -f svg -o x.csv"] {
-        let said = fail(&dir, command, 2);
+        let said = PROGRAM.refuse(&dir, command, 2);
         assert!(said.contains("contradicts the extension"), "{said}");
     }
     assert!(!dir.path().join("x.json").exists());

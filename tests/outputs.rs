@@ -1,37 +1,16 @@
 //! Drawings as output, pens, crop, copies, and several files in one command.
 
 use std::fmt::Write as _;
-use std::process::Output;
 
-use assert_cmd::cargo::cargo_bin;
-use test_support::TestDir;
+use test_support::{Program, TestDir};
+
+const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_plotplan"));
 
 /// Squares of 20 mm: pen 1 at (10, 10), pen 2 at (60, 10), pen 1 at (20, 60) mm.
 const SQUARES: &str = "IN;SP1;PU400,400;PD1200,400,1200,1200,400,1200,400,400;PU;SP2;PU2400,400;PD3200,400,3200,1200,\
                        2400,1200,2400,400;PU;SP1;PU800,2400;PD1600,2400,1600,3200,800,3200,800,2400;PU;";
 /// A circle of 20 mm radius about (50, 250) mm of an A4 page, red, in a layer with a number.
 const CIRCLE: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" width="210mm" height="297mm" viewBox="0 0 210 297"><g inkscape:groupmode="layer" inkscape:label="4 red"><circle cx="50" cy="47" r="20" fill="none" stroke="#cc0000"/></g></svg>"##;
-
-fn run(dir: &TestDir, arguments: &str) -> Output {
-    let mut command = std::process::Command::new(cargo_bin!("plotplan"));
-    command.current_dir(dir.path()).args(arguments.split_whitespace());
-    command.env("COLUMNS", "200").env("XDG_CONFIG_HOME", dir.path().join("config"));
-    command.output().expect("the program runs")
-}
-
-fn succeed(dir: &TestDir, arguments: &str) -> String {
-    let output = run(dir, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "plotplan {arguments}\n{errors}");
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn fail(dir: &TestDir, arguments: &str, code: i32) -> String {
-    let output = run(dir, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(code), "plotplan {arguments}\n{errors}");
-    errors
-}
 
 fn drawings() -> TestDir {
     let dir = TestDir::new();
@@ -42,7 +21,7 @@ fn drawings() -> TestDir {
 
 /// Ink of a file by `check`: strokes, length, bounds and pens.
 fn check(dir: &TestDir, file: &str) -> String {
-    let text = succeed(dir, &format!("check {file}"));
+    let text = PROGRAM.stdout_of(dir, &format!("check {file}"));
     text.lines().last().unwrap_or_default().to_owned()
 }
 
@@ -66,13 +45,13 @@ fn hpgl_output_honours_placement_and_crop() {
         ("--paper 70x70 --crop sheet", "160.0 mm of ink from 10.00, 10.00 to 70.00, 70.00"),
         ("--machine corexy --place 1,1", "240.0 mm of ink from 11.00, 11.00 to 81.00, 81.00"),
     ] {
-        succeed(&dir, &format!("convert a.hpgl -o out.hpgl {options}"));
+        PROGRAM.stdout_of(&dir, &format!("convert a.hpgl -o out.hpgl {options}"));
         let found = check(&dir, "out.hpgl");
         assert!(found.contains(expected), "{options}: {found}, expected {expected}");
     }
     // Nothing changes without options.
-    succeed(&dir, "convert a.hpgl -o once.hpgl");
-    succeed(&dir, "convert once.hpgl -o twice.hpgl");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl -o once.hpgl");
+    PROGRAM.stdout_of(&dir, "convert once.hpgl -o twice.hpgl");
     assert_eq!(dir.text("once.hpgl"), dir.text("twice.hpgl"));
 }
 
@@ -80,9 +59,9 @@ fn hpgl_output_honours_placement_and_crop() {
 fn drawing_output_for_a_machine_plans_as_the_drawing_does() {
     let dir = drawings();
     let options = "--machine coaxial --fit --rotate 30";
-    succeed(&dir, &format!("convert a.hpgl {options} -o direct.csv"));
-    succeed(&dir, &format!("convert a.hpgl {options} --order optimize -o placed.svg"));
-    succeed(&dir, "convert placed.svg --machine coaxial --order file -o later.csv");
+    PROGRAM.stdout_of(&dir, &format!("convert a.hpgl {options} -o direct.csv"));
+    PROGRAM.stdout_of(&dir, &format!("convert a.hpgl {options} --order optimize -o placed.svg"));
+    PROGRAM.stdout_of(&dir, "convert placed.svg --machine coaxial --order file -o later.csv");
     let ticks = |file: &str| -> Vec<String> {
         dir.text(file)
             .lines()
@@ -98,7 +77,7 @@ fn drawing_output_for_a_machine_plans_as_the_drawing_does() {
 #[test]
 fn svg_output_keeps_sheet_colours_and_arcs() {
     let dir = drawings();
-    succeed(&dir, "convert b.svg -o out.svg --paper A3,landscape --crop 40,240,20,100");
+    PROGRAM.stdout_of(&dir, "convert b.svg -o out.svg --paper A3,landscape --crop 40,240,20,100");
     let svg = dir.text("out.svg");
     assert!(
         svg.contains(r#"width="420.000mm" height="297.000mm" viewBox="0.000 -297.000 420.000 297.000""#),
@@ -107,9 +86,9 @@ fn svg_output_keeps_sheet_colours_and_arcs() {
     assert!(svg.contains(r##"inkscape:label="pen 4" stroke="#cc0000""##), "{svg}");
     let paths = svg.lines().filter(|line| line.starts_with("<path"));
     assert!(paths.clone().count() == 1 && paths.clone().all(|path| path.contains("A20.000 20.000")), "{svg}");
-    assert!(succeed(&dir, "info out.svg").contains("#cc0000"));
+    assert!(PROGRAM.stdout_of(&dir, "info out.svg").contains("#cc0000"));
     for picture in ["p.svg --paper A4", "q.svg --machine corexy"] {
-        succeed(&dir, &format!("preview b.svg -o {picture}"));
+        PROGRAM.stdout_of(&dir, &format!("preview b.svg -o {picture}"));
         assert!(dir.text(&picture[..5]).contains(r##"id="pen4" stroke="#cc0000""##));
     }
 }
@@ -125,18 +104,18 @@ fn pens_are_selected_and_renumbered() {
             "2 strokes, 160.0 mm of ink from 10.00, 10.00 to 40.00, 80.00 mm, pens 2",
         ),
     ] {
-        let text = succeed(&dir, &format!("check a.hpgl {options}"));
+        let text = PROGRAM.stdout_of(&dir, &format!("check a.hpgl {options}"));
         assert!(text.contains(expected), "{options}: {text}");
-        succeed(&dir, &format!("convert a.hpgl {options} -o out.hpgl"));
+        PROGRAM.stdout_of(&dir, &format!("convert a.hpgl {options} -o out.hpgl"));
         assert!(check(&dir, "out.hpgl").contains(expected), "{options}");
     }
-    assert!(fail(&dir, "convert a.hpgl --only-pens 3,7 -o x.hpgl", 1).contains("leaves nothing"));
-    let output = run(&dir, "check a.hpgl --only-pens 2,7");
+    assert!(PROGRAM.fail(&dir, "convert a.hpgl --only-pens 3,7 -o x.hpgl", 1).contains("leaves nothing"));
+    let output = PROGRAM.run(&dir, "check a.hpgl --only-pens 2,7");
     assert!(String::from_utf8_lossy(&output.stderr).contains("no stroke has pen 7"));
     // A plan of selected pens is verified with the same selection.
-    succeed(&dir, "convert a.hpgl --machine corexy --only-pens 2 --crop 0,0,70,70 -o plan.csv");
-    succeed(&dir, "verify plan.csv --drawing a.hpgl --only-pens 2 --crop 0,0,70,70");
-    fail(&dir, "verify plan.csv --drawing a.hpgl", 1);
+    PROGRAM.stdout_of(&dir, "convert a.hpgl --machine corexy --only-pens 2 --crop 0,0,70,70 -o plan.csv");
+    PROGRAM.stdout_of(&dir, "verify plan.csv --drawing a.hpgl --only-pens 2 --crop 0,0,70,70");
+    PROGRAM.fail(&dir, "verify plan.csv --drawing a.hpgl", 1);
 }
 
 #[test]
@@ -147,13 +126,13 @@ fn ordering_of_drawing_outputs_reduces_travel_and_removes_duplicates() {
         write!(file, "PU{0},0;PD{0},400;", 400 * k).expect("text");
     }
     dir.write("lines.hpgl", file);
-    succeed(&dir, "convert lines.hpgl -o same.hpgl");
+    PROGRAM.stdout_of(&dir, "convert lines.hpgl -o same.hpgl");
     assert_eq!(dir.text("same.hpgl").matches("PU").count(), 13);
-    succeed(&dir, "convert lines.hpgl --dedupe -o single.hpgl");
+    PROGRAM.stdout_of(&dir, "convert lines.hpgl --dedupe -o single.hpgl");
     let single = dir.text("single.hpgl");
     assert_eq!(single.matches("PU").count(), 11);
     assert!(single.starts_with("IN;\nSP1;\nPU0,0;PD0,400;\nPU2800,0;"), "the file's order stays: {single}");
-    let output = run(&dir, "convert lines.hpgl --dedupe --order optimize -o sorted.hpgl");
+    let output = PROGRAM.run(&dir, "convert lines.hpgl --dedupe --order optimize -o sorted.hpgl");
     let report = String::from_utf8_lossy(&output.stderr).into_owned();
     // Up and down over 90 mm.
     assert!(report.contains("strokes  10 of 12"), "{report}");
@@ -162,69 +141,73 @@ fn ordering_of_drawing_outputs_reduces_travel_and_removes_duplicates() {
     let starts = ["SP1;\nPU0,0;PD0,400;\nPU400,400;", "SP1;\nPU0,400;PD0,0;\nPU400,0;"];
     let ends = ["SP1;\nPU3600,0;PD3600,400;\nPU3200,400;", "SP1;\nPU3600,400;PD3600,0;\nPU3200,0;"];
     assert!(starts.iter().chain(&ends).any(|start| sorted.contains(start)), "{sorted}");
-    succeed(&dir, "convert lines.hpgl --dedupe --order file --machine corexy -o plan.csv");
+    PROGRAM.stdout_of(&dir, "convert lines.hpgl --dedupe --order file --machine corexy -o plan.csv");
 }
 
 #[test]
 fn options_that_need_a_sheet_ask_for_one() {
     let dir = drawings();
     for option in ["--fit", "--align center", "--shrink", "--crop sheet"] {
-        let message = fail(&dir, &format!("convert a.hpgl -o x.svg {option}"), 2);
+        let message = PROGRAM.fail(&dir, &format!("convert a.hpgl -o x.svg {option}"), 2);
         assert!(message.contains("needs a sheet: give --paper or --machine"), "{message}");
     }
-    assert!(fail(&dir, "convert a.hpgl -o x.svg --law sine", 2).contains("it holds no motion"));
-    assert!(fail(&dir, "convert a.hpgl -o x.svg --effort 1", 2).contains("--order optimize"));
-    assert!(fail(&dir, "convert a.hpgl -o x.svg --gap 5mm", 2).contains("without --copies"));
-    assert!(fail(&dir, "convert a.hpgl -o x.svg --crop 500,500,5,5", 1).contains("no ink lies within"));
+    assert!(PROGRAM.fail(&dir, "convert a.hpgl -o x.svg --law sine", 2).contains("it holds no motion"));
+    assert!(PROGRAM.fail(&dir, "convert a.hpgl -o x.svg --effort 1", 2).contains("--order optimize"));
+    assert!(PROGRAM.fail(&dir, "convert a.hpgl -o x.svg --gap 5mm", 2).contains("without --copies"));
+    assert!(
+        PROGRAM.fail(&dir, "convert a.hpgl -o x.svg --crop 500,500,5,5", 1).contains("no ink lies within")
+    );
 }
 
 #[test]
 fn several_files_are_drawn_over_each_other() {
     let dir = drawings();
-    succeed(&dir, "convert a.hpgl b.svg -o both.svg");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl b.svg -o both.svg");
     let found = check(&dir, "both.svg");
     assert!(found.starts_with("4 strokes, 365.7 mm of ink"), "{found}");
     assert!(found.ends_with("pens 1, 2, 4"), "{found}");
-    succeed(&dir, "convert a.hpgl b.svg --hatch 2mm --copies 3x2 --gap 5mm -o grid.hpgl");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl b.svg --hatch 2mm --copies 3x2 --gap 5mm -o grid.hpgl");
     assert!(
         check(&dir, "grid.hpgl").starts_with("24 strokes, 2.19 m of ink"),
         "{}",
         check(&dir, "grid.hpgl")
     );
-    assert!(fail(&dir, "convert a.hpgl a.hpgl --hatch 2mm -o x.hpgl", 2).contains("no effect"));
-    succeed(&dir, "preview a.hpgl b.svg -o both.png");
+    assert!(PROGRAM.fail(&dir, "convert a.hpgl a.hpgl --hatch 2mm -o x.hpgl", 2).contains("no effect"));
+    PROGRAM.stdout_of(&dir, "preview a.hpgl b.svg -o both.png");
     // A plan of two drawings names both, and verifies against both.
-    succeed(&dir, "convert a.hpgl b.svg --machine corexy --fit -o both.json");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl b.svg --machine corexy --fit -o both.json");
     assert!(dir.text("both.json").contains("a.hpgl + b.svg"));
-    succeed(&dir, "verify both.json --drawing a.hpgl --drawing b.svg");
+    PROGRAM.stdout_of(&dir, "verify both.json --drawing a.hpgl --drawing b.svg");
 }
 
 #[test]
 fn pages_and_pens_are_written_to_files_of_their_own() {
     let dir = drawings();
     dir.write("pages.hpgl", "IN;SP1;PU0,0;PD400,0;PG;SP2;PU0,0;PD800,0;SP3;PU0,0;PD0,400;PG;");
-    succeed(&dir, "convert pages.hpgl --page all -o out-%p.hpgl");
+    PROGRAM.stdout_of(&dir, "convert pages.hpgl --page all -o out-%p.hpgl");
     assert!(check(&dir, "out-1.hpgl").starts_with("1 stroke, 10.0 mm"));
     assert!(check(&dir, "out-2.hpgl").starts_with("2 strokes, 30.0 mm"));
-    succeed(&dir, "convert pages.hpgl --page 2 --split pens -o pen%p.hpgl");
+    PROGRAM.stdout_of(&dir, "convert pages.hpgl --page 2 --split pens -o pen%p.hpgl");
     assert!(check(&dir, "pen2.hpgl").starts_with("1 stroke, 20.0 mm"));
     assert!(check(&dir, "pen3.hpgl").starts_with("1 stroke, 10.0 mm"));
-    succeed(&dir, "convert pages.hpgl --page all --split pens -m corexy -o p%p-n%n.json");
+    PROGRAM.stdout_of(&dir, "convert pages.hpgl --page all --split pens -m corexy -o p%p-n%n.json");
     for file in ["p1-n1.json", "p2-n2.json", "p2-n3.json"] {
-        assert!(succeed(&dir, &format!("info {file}")).contains("plan"), "{file}");
+        assert!(PROGRAM.stdout_of(&dir, &format!("info {file}")).contains("plan"), "{file}");
     }
     // The plan document's own options make the same plan again.
     let document: serde_json::Value = serde_json::from_str(&dir.text("p2-n3.json")).expect("JSON");
     let options = document["settings"]["command_line"].as_array().expect("a list");
     let options: Vec<&str> = options.iter().filter_map(|option| option.as_str()).collect();
-    succeed(&dir, &format!("convert pages.hpgl -m corexy -o again.json {}", options.join(" ")));
+    PROGRAM.stdout_of(&dir, &format!("convert pages.hpgl -m corexy -o again.json {}", options.join(" ")));
     let rows = |file: &str| {
         serde_json::from_str::<serde_json::Value>(&dir.text(file)).expect("JSON")["rows"].clone()
     };
     assert_eq!(rows("again.json"), rows("p2-n3.json"));
-    assert!(fail(&dir, "convert pages.hpgl --page all -o one.hpgl", 2).contains("%p"));
+    assert!(PROGRAM.fail(&dir, "convert pages.hpgl --page all -o one.hpgl", 2).contains("%p"));
     assert!(
-        fail(&dir, "convert a.hpgl --split pens -o x.hpgl", 2).contains("--split pens writes several files")
+        PROGRAM
+            .fail(&dir, "convert a.hpgl --split pens -o x.hpgl", 2)
+            .contains("--split pens writes several files")
     );
 }
 
@@ -232,33 +215,35 @@ fn pages_and_pens_are_written_to_files_of_their_own() {
 fn folder_takes_a_file_for_each_drawing() {
     let dir = drawings();
     dir.write("c.pdf", "%PDF-1.4\n");
-    let message = fail(&dir, "convert a.hpgl b.svg c.pdf -o plans/ -m corexy --fit", 1);
+    let message = PROGRAM.fail(&dir, "convert a.hpgl b.svg c.pdf -o plans/ -m corexy --fit", 1);
     assert!(message.contains("a.hpgl -> plans/a.ticks: "), "{message}");
     assert!(message.contains("c.pdf: this is a PDF document"), "{message}");
     assert!(message.ends_with("2 of 3 drawings converted\n"), "{message}");
     for plan in ["plans/a.ticks", "plans/b.ticks"] {
-        assert!(succeed(&dir, &format!("info {plan}")).contains("corexy"));
+        assert!(PROGRAM.stdout_of(&dir, &format!("info {plan}")).contains("corexy"));
     }
-    succeed(&dir, "convert a.hpgl b.svg -o plans --format hpgl");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl b.svg -o plans --format hpgl");
     assert_eq!(check(&dir, "plans/a.hpgl"), check(&dir, "a.hpgl"));
-    succeed(&dir, "convert a.hpgl b.svg -o plans/%f-small.svg --scale 0.1");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl b.svg -o plans/%f-small.svg --scale 0.1");
     assert!(check(&dir, "plans/a-small.svg").contains("24.0 mm of ink"));
     // An output never replaces an input, whichever is read first; two outputs never share a name.
-    let message = fail(&dir, "convert b.svg a.hpgl -o ./%f.hpgl", 1);
+    let message = PROGRAM.fail(&dir, "convert b.svg a.hpgl -o ./%f.hpgl", 1);
     assert!(message.contains("an output does not replace an input"), "{message}");
     assert_eq!(dir.text("a.hpgl"), SQUARES);
     assert!(
-        fail(&dir, "convert a.hpgl plans/a.hpgl -o plans/ --format svg", 2).contains("would both be written")
+        PROGRAM
+            .fail(&dir, "convert a.hpgl plans/a.hpgl -o plans/ --format svg", 2)
+            .contains("would both be written")
     );
 }
 
 #[test]
 fn options_for_drawings_are_refused_on_plans() {
     let dir = drawings();
-    succeed(&dir, "convert a.hpgl -m corexy -o plan.csv");
+    PROGRAM.stdout_of(&dir, "convert a.hpgl -m corexy -o plan.csv");
     for command in
         ["info plan.csv --only-pens 1", "info plan.csv --page 2", "preview plan.csv -o x.svg --scale 2"]
     {
-        assert!(fail(&dir, command, 2).contains("has no effect on a plan"), "{command}");
+        assert!(PROGRAM.fail(&dir, command, 2).contains("has no effect on a plan"), "{command}");
     }
 }

@@ -144,6 +144,33 @@ pub struct ColorConflict {
     pub page: usize,
 }
 
+/// Numbers the pens of pages that are numbered by colour so that a colour has one pen in all of them.
+/// A pen keeps its number where no other colour has it.
+pub fn number_colors_together(pages: &mut [Page]) {
+    let mut color_of: BTreeMap<Pen, [u8; 3]> = BTreeMap::new();
+    for page in pages {
+        let is_used = |pen: u16, color_of: &BTreeMap<Pen, [u8; 3]>| {
+            color_of.contains_key(&Pen(pen)) || page.pens.contains_key(&Pen(pen))
+        };
+        let mut map = Vec::new();
+        for (&pen, settings) in &page.pens {
+            let Some(color) = settings.color else { continue };
+            let same = color_of.iter().find(|(_, known)| **known == color).map(|(pen, _)| *pen);
+            let new = match same {
+                Some(same) => same,
+                None if !color_of.contains_key(&pen) => pen,
+                None => match (1..=u16::MAX).find(|&number| !is_used(number, &color_of)) {
+                    Some(free) => Pen(free),
+                    None => pen,
+                },
+            };
+            color_of.entry(new).or_insert(color);
+            map.push((pen.0, new.0));
+        }
+        Layout { pen_map: map, ..Layout::default() }.apply_pens(page);
+    }
+}
+
 /// Draws pages over each other in one frame, the first one first.
 ///
 /// Each page comes with the length of its source. Spans are those of the sources one after the
@@ -231,6 +258,24 @@ mod tests {
         assert_eq!(starts, [1, 1, 101, 151]);
         assert_eq!(conflicts, [ColorConflict { pen: Pen(1), kept: [1, 0, 0], lost: [255, 0, 0], page: 1 }]);
         assert_eq!(all.pens[&Pen(1)].color, Some([1, 0, 0]));
+    }
+
+    #[test]
+    fn colours_have_one_pen_in_all_drawings() {
+        let with_colors = |colors: &[(u16, u8)]| {
+            let mut page = page(&colors.iter().map(|color| color.0).collect::<Vec<_>>());
+            for &(pen, red) in colors {
+                page.pens.get_mut(&Pen(pen)).unwrap().color = Some([red, 0, 0]);
+            }
+            page
+        };
+        let mut pages = [with_colors(&[(1, 10), (2, 20)]), with_colors(&[(1, 20), (2, 30), (3, 10)])];
+        number_colors_together(&mut pages);
+        let pens =
+            |page: &Page| -> Vec<u16> { page.drawing.strokes.iter().map(|stroke| stroke.pen.0).collect() };
+        assert_eq!(pens(&pages[0]), [1, 2]);
+        assert_eq!(pens(&pages[1]), [2, 4, 1]);
+        assert_eq!(pages[1].pens[&Pen(4)].color, Some([30, 0, 0]));
     }
 
     #[test]

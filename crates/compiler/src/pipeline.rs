@@ -64,8 +64,8 @@ pub struct Request {
 pub enum Step {
     /// Looking for the place and checking reach.
     Placing,
-    /// Finding an order.
-    Ordering,
+    /// Finding an order: per mille of the search done, and 1000.
+    Ordering(u64, u64),
     /// Planning motion: strokes planned, strokes in all.
     Planning(usize, usize),
     /// Replaying the plan: rows done, rows in all.
@@ -264,7 +264,7 @@ pub fn arrange(
     let (mut drawing, ordering) = match (order, target) {
         (Order::File, _) => (placed.drawing, None),
         (Order::Optimize(options), Target::Machine(machine)) => {
-            let (ordered, report) = by_travel_time(placed.drawing, machine, options);
+            let (ordered, report) = by_travel_time(placed.drawing, machine, options, &|_| {});
             (ordered, Some(report))
         }
         (Order::Optimize(options), _) => {
@@ -283,10 +283,11 @@ fn by_travel_time(
     drawing: Drawing,
     machine: &Machine,
     options: &ordering::Options,
+    progress: &dyn Fn(f64),
 ) -> (Drawing, ordering::Report) {
     let start = machine.mechanism().forward(&machine.start());
     let options = ordering::Options { start: Some(start), park: Some(start), ..options.clone() };
-    ordering::optimize(drawing, &TravelTime(machine), &options)
+    ordering::optimize_with_progress(drawing, &TravelTime(machine), &options, progress)
 }
 
 /// Places the drawing, orders its strokes, plans and verifies. `progress` is called at every step.
@@ -306,8 +307,10 @@ pub fn compile<'a>(
     let (ordered, ordering) = match &request.order {
         Order::File => (placed.clone(), None),
         Order::Optimize(options) => {
-            progress(Step::Ordering);
-            let (ordered, report) = by_travel_time(placed.clone(), machine, options);
+            progress(Step::Ordering(0, 1000));
+            let (ordered, report) = by_travel_time(placed.clone(), machine, options, &|share| {
+                progress(Step::Ordering((1000.0 * share) as u64, 1000));
+            });
             (ordered, Some(report))
         }
     };

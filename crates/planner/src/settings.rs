@@ -161,10 +161,7 @@ fn aim(machine: &Machine) -> Aim {
 /// Checks that every setting is in its valid range.
 pub(crate) fn check(settings: &Settings) -> Result<(), PlanError> {
     let require = |holds: bool, what: &'static str| holds.then_some(()).ok_or(PlanError::Setting { what });
-    require(
-        settings.tolerance_mm >= 1e-4 && settings.tolerance_mm.is_finite(),
-        "the tolerance must be at least 0.0001 mm",
-    )?;
+    require((1e-4..=10.0).contains(&settings.tolerance_mm), "the tolerance must be from 0.0001 mm to 10 mm")?;
     require((1..=10_000_000).contains(&settings.period_us), "the period must be between 1 us and 10 s")?;
     let speeds = settings.pen_speeds_mm_s.iter().all(|(_, speed)| *speed > 0.0 && speed.is_finite());
     require(speeds, "a pen's speed must be a positive number of mm/s")?;

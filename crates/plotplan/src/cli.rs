@@ -105,14 +105,14 @@ pub(crate) enum Command {
 pub(crate) struct Convert {
     /// Drawings to read; `-` for standard input. Several are drawn over each other in one frame, or converted one by one
     /// if --output is a folder
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", value_parser = name())]
     pub(crate) files: Vec<String>,
     /// Machine: a preset's name (see `plotplan machine list`) or a machine file
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     /// Where to write; `-` for standard output. A folder takes one file for each drawing. In a name, `%f` stands for the
     /// drawing's name without extension, `%p` for the page (or the pen, with --split pens only), `%n` for the pen
-    #[arg(short, long, value_name = "OUT", default_value = "-")]
+    #[arg(short, long, value_name = "OUT", default_value = "-", value_parser = name())]
     pub(crate) output: String,
     /// Write one file for each pen
     #[arg(long, value_enum)]
@@ -227,7 +227,7 @@ pub(crate) struct Reading {
     #[arg(long, value_name = "NAME[,PAPER]")]
     pub(crate) made_for: Option<String>,
     /// The sheet on the machine: A4, A3,landscape, letter or 200x300mm. With --plotter: the paper of that plotter
-    #[arg(long, value_name = "PAPER")]
+    #[arg(long, value_name = "PAPER", value_parser = name())]
     pub(crate) paper: Option<String>,
     /// HP-GL: draw the ink of pens that the file makes white (PC), or leave it out
     #[arg(long, value_name = "HOW", value_enum, default_value_t = WhitePens::Draw)]
@@ -457,9 +457,10 @@ pub(crate) enum Mirror {
 #[derive(Debug, Args)]
 pub(crate) struct Check {
     /// Drawing to read; `-` for standard input
+    #[arg(value_parser = name())]
     pub(crate) file: String,
     /// Also check whether this machine can draw it
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     #[command(flatten)]
     pub(crate) reading: Reading,
@@ -470,9 +471,10 @@ pub(crate) struct Check {
 #[derive(Debug, Args)]
 pub(crate) struct Info {
     /// Drawing or plan to read; `-` for standard input
+    #[arg(value_parser = name())]
     pub(crate) file: String,
     /// For a drawing: also plan it for this machine. For a plan of a machine that is no preset: its file
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     #[command(flatten)]
     pub(crate) reading: Reading,
@@ -483,12 +485,13 @@ pub(crate) struct Info {
 #[derive(Debug, Args)]
 pub(crate) struct Verify {
     /// Plan to verify; `-` for standard input
+    #[arg(value_parser = name())]
     pub(crate) plan: String,
     /// The drawing it should draw; without it only motion is verified. Give it once for each of several drawings
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = name())]
     pub(crate) drawing: Vec<String>,
     /// Machine whose limits apply [default: of the plan document, else the preset the plan names]
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     /// Largest distance between drawing and pen that the plan was made for; a plan document knows its own
     #[arg(long, value_name = "LENGTH", value_parser = length)]
@@ -500,17 +503,17 @@ pub(crate) struct Verify {
 #[derive(Debug, Args)]
 pub(crate) struct Preview {
     /// Plan, or drawings, which are drawn over each other; `-` for standard input
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", value_parser = name())]
     pub(crate) files: Vec<String>,
     /// Picture to write: NAME.svg or NAME.png, or NAME.html: the plan as it is drawn, in one page for the browser; `-` for
     /// standard output
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", value_parser = name())]
     pub(crate) output: String,
     /// Format of the picture [default: by the extension of --output; svg on standard output]
     #[arg(short, long, value_enum)]
     pub(crate) format: Option<PictureFormat>,
     /// The machine to show it on; a plan knows its own
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     #[command(flatten)]
     pub(crate) reading: Reading,
@@ -532,20 +535,20 @@ pub(crate) enum PictureFormat {
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
     /// Plan or drawing; `-` for standard input
-    #[arg(required_unless_present = "step")]
+    #[arg(required_unless_present = "step", value_parser = name())]
     pub(crate) file: Option<String>,
     /// Machine with a `[drive]` table; for a plan document only to take another drive
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     /// For a plan: the drawing that the ink is compared with, instead of the plan's own ink
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = name())]
     pub(crate) drawing: Vec<String>,
     /// Exit with 1 when ink strays or is missed by more than this
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub(crate) within: Option<f64>,
     /// Write the predicted ink over the drawing (NAME.svg, NAME.png; NAME.html: in motion, in one page for the browser), or
     /// the motion every 2 ms (NAME.csv); with --step its response (NAME.svg, NAME.csv)
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", value_parser = name())]
     pub(crate) output: Option<String>,
     /// Setpoints, instead of those of the drive
     #[arg(long, value_enum)]
@@ -568,10 +571,10 @@ pub(crate) struct Simulate {
 #[derive(Debug, Args)]
 pub(crate) struct Tune {
     /// Machine with a `[drive]` table
-    #[arg(short, long, value_name = "NAME|FILE.toml", required_unless_present = "from_step")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", required_unless_present = "from_step", value_parser = name())]
     pub(crate) machine: Option<String>,
     /// Drawing whose ink error is to be least [default: a test pattern of lines, corners and a circle]
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = name())]
     pub(crate) drawing: Vec<String>,
     /// Identify a motor from a record of a step response instead: rows of time in s, position in ticks, duty in percent
     #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["machine", "drawing", "output", "loop_period"])]
@@ -580,7 +583,7 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub(crate) loop_period: Option<f64>,
     /// Write the machine file with the new gains, its comments kept
-    #[arg(short, long, value_name = "FILE.toml")]
+    #[arg(short, long, value_name = "FILE.toml", value_parser = name())]
     pub(crate) output: Option<String>,
     #[command(flatten)]
     pub(crate) reading: Reading,
@@ -602,9 +605,10 @@ pub(crate) enum Setpoints {
 #[derive(Debug, Args)]
 pub(crate) struct Send {
     /// Plan to send, or for gcode, xy-serial, hpgl and raw a file in the machine's own language; `-` for standard input
+    #[arg(value_parser = name())]
     pub(crate) plan: String,
     /// Serial device, pseudo-terminal, or tcp:HOST:PORT
-    #[arg(short, long, value_name = "PATH", required_unless_present = "dry_run")]
+    #[arg(short, long, value_name = "PATH", required_unless_present = "dry_run", value_parser = name())]
     pub(crate) port: Option<String>,
     /// Protocol of the machine
     #[arg(long, value_enum)]
@@ -637,7 +641,7 @@ pub(crate) struct Send {
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time)]
     pub(crate) reconnect: f64,
     /// The machine, where the plan only knows its name and it is no preset
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     /// For ebb: SM moves, which every firmware version executes
     #[arg(long)]
@@ -712,7 +716,7 @@ pub(crate) struct Emulate {
     #[arg(long, value_name = "OUT.csv")]
     pub(crate) ink: Option<String>,
     /// For ticks and ebb: the machine, for the motors' start and the picture
-    #[arg(short, long, value_name = "NAME|FILE.toml")]
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
     /// Fault to inject: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N, held=AT:TIME, power-cut=AT
     #[arg(long, value_name = "FAULT", value_parser = fault)]
@@ -741,6 +745,7 @@ pub(crate) enum Machine {
     /// Print a machine as a file that can be changed and given to --machine
     Show {
         /// Name of a preset, or a machine file
+        #[arg(value_parser = name())]
         name: String,
         /// Print the machine header of the firmware instead, for this drive [default: as `[drive]` of
         /// the machine says, else step]
@@ -751,14 +756,16 @@ pub(crate) enum Machine {
     /// Check a machine file: validity, and reach of its sheet
     Check {
         /// Machine file, or the name of a preset
+        #[arg(value_parser = name())]
         file: String,
     },
     /// Draw a picture of a machine: reach, sheet, start pose, and its resolution as shades
     Preview {
         /// Name of a preset, or a machine file
+        #[arg(value_parser = name())]
         name: String,
         /// Picture to write: NAME.svg or NAME.png; `-` for standard output
-        #[arg(short, long, value_name = "OUT")]
+        #[arg(short, long, value_name = "OUT", value_parser = name())]
         output: String,
         /// Format of the picture [default: by the extension of --output; svg on standard output]
         #[arg(short, long, value_enum)]
@@ -997,15 +1004,24 @@ fn scale(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a positive factor such as 0.5, or a percentage such as 50%".to_owned())
 }
 
-/// An angle in rad; a bare number is in degrees.
+/// The name of a file, a machine, a port or the like.
+fn name() -> clap::builder::NonEmptyStringValueParser {
+    clap::builder::NonEmptyStringValueParser::new()
+}
+
+/// An angle in rad, at most a full turn; a bare number is in degrees.
 fn angle(text: &str) -> Result<f64, String> {
     let degrees = text.trim().parse::<f64>().ok().filter(|degrees| degrees.is_finite());
-    match degrees {
-        Some(degrees) => Ok(degrees.to_radians()),
+    let angle = match degrees {
+        Some(degrees) => degrees.to_radians(),
         None => quantity::angle_rad(text).map_err(|_| {
             "expected an angle in degrees such as 90, or with a unit such as 1.57rad".to_owned()
-        }),
+        })?,
+    };
+    if angle.abs() > std::f64::consts::TAU + 1e-9 {
+        return Err("expected an angle of at most a full turn: -360 to 360 degrees".to_owned());
     }
+    Ok(angle)
 }
 
 fn length(text: &str) -> Result<f64, String> {

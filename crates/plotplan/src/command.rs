@@ -19,6 +19,7 @@ use clap::CommandFactory as _;
 use compiler::import::{self, Page, PenSettings};
 use compiler::layout::Crop;
 use compiler::pipeline::{Order, Request};
+use compiler::report::Code;
 use drawing::{Pen, Vec2};
 use kinematics::Machine;
 use planner::{Easing, Mirror, PlacementOptions, Scale, TimingLaw};
@@ -52,11 +53,25 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
                     )
                 });
             }
-            let Some((title, explanation)) = import::explain(&explain.code) else {
-                let what = format!("unknown diagnostic code {} (e.g. H0101)", explain.code);
-                return Err(Failure::Usage(anyhow::anyhow!(what)));
+            let kind = Code::ALL.iter().find(|code| code.name() == explain.code);
+            let text = match (import::explain(&explain.code), kind) {
+                (Some((title, explanation)), _) => format!("{title}\n\n{explanation}\n"),
+                (None, Some(code)) => {
+                    let exit = match code.exit_code() {
+                        0 => "a warning".to_owned(),
+                        exit => format!("exit code {exit}"),
+                    };
+                    format!("{} ({exit})\n\n{}\n", code.name(), code.meaning())
+                }
+                (None, None) => {
+                    let what = format!(
+                        "unknown code {}: diagnostics of drawings have codes such as H0101 and S0101, messages of the program such as {}",
+                        explain.code,
+                        Code::OutOfReach.name()
+                    );
+                    return Err(Failure::Usage(anyhow::anyhow!(what)));
+                }
             };
-            let text = format!("{title}\n\n{explanation}\n");
             output::write("-", |out| out.write_all(text.as_bytes()))
         }
         Command::Schema(schema) => {

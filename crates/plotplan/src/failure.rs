@@ -32,7 +32,21 @@ impl Failure {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             Self::ClosedPipe
         } else {
-            Self::Io(anyhow::Error::new(error).context(format!("cannot write {to}")))
+            let folder = std::path::Path::new(to).parent().filter(|folder| !folder.as_os_str().is_empty());
+            let what = match folder {
+                Some(folder) if error.kind() == std::io::ErrorKind::NotFound && !folder.exists() => {
+                    return Self::Io(anyhow::anyhow!(
+                        "cannot write {to}: there is no folder {}",
+                        folder.display()
+                    ));
+                }
+                _ => format!("cannot write {to}"),
+            };
+            // An error that the system did not number has Rust's own words, such as "entity not found".
+            if error.raw_os_error().is_none() && error.kind() == std::io::ErrorKind::NotFound {
+                return Self::Io(anyhow::anyhow!("{what}: the folder does not take files"));
+            }
+            Self::Io(anyhow::Error::new(error).context(what))
         }
     }
 
@@ -129,8 +143,10 @@ fn usage_kind(error: &anyhow::Error) -> Code {
 /// The line of a machine file that a message is about.
 fn place_of(all: &anyhow::Error) -> Option<Place> {
     let file = all.chain().find_map(|cause| cause.downcast_ref::<MachineFileError>())?;
-    let MachineFileError::Syntax(error) = file else { return None };
-    let line = error.line.as_ref().map(|(line, _)| *line);
+    let line = match file {
+        MachineFileError::Syntax(error) => error.line.as_ref().map(|(line, _)| *line),
+        _ => all.downcast_ref::<machines::Unusable>().and_then(|unusable| unusable.line),
+    };
     let file = error_name(all);
     line.map(|line| Place { file, line: Some(line), ..Place::default() })
 }

@@ -203,12 +203,18 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     let options = arguments.options(fonts::of(arguments)?);
     let formats: Vec<&str> = inputs.0.iter().map(|input| import::format(&input.bytes)).collect();
     let mut pages = Vec::new();
+    let mut by_color = arguments.layout.pen_map.is_empty() && arguments.layout.only_pens.is_none();
     for (input, format) in inputs.0.iter().zip(&formats) {
         let mut loaded = load(input, arguments, &options.for_format(format, &formats))?;
         let mut page = loaded.document.pages.swap_remove(loaded.page);
+        by_color &= *format == "SVG" && is_numbered_by_color(&page);
         layout.apply_pens(&mut page);
-        pages.push((page, input.bytes.len()));
+        pages.push(page);
     }
+    if by_color {
+        layout::number_colors_together(&mut pages);
+    }
+    let pages = pages.into_iter().zip(&inputs.0).map(|(page, input)| (page, input.bytes.len())).collect();
     let is_one = formats.iter().all(|format| *format == formats[0]);
     let format = if is_one { formats[0] } else { "several formats" };
     let (mut page, conflicts) = layout::overlay(pages);
@@ -229,6 +235,15 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     Ok(LoadedDrawing { document, page: 0 })
 }
 
+/// Whether an SVG's pens are numbered by colour: it has at most one layer, and that has no number.
+fn is_numbered_by_color(page: &Page) -> bool {
+    let mut names = page.pens.values().filter_map(|pen| pen.name.as_deref());
+    let Some(first) = names.next() else { return true };
+    let text = first.trim_start_matches(['!', ' ']).to_ascii_lowercase();
+    let has_number = text.starts_with("pen") || text.starts_with(|first: char| first.is_ascii_digit());
+    !has_number && names.all(|name| name == first)
+}
+
 /// Reads one file as it is, and prints its diagnostics.
 fn load(
     input: &Input,
@@ -237,6 +252,11 @@ fn load(
 ) -> Result<LoadedDrawing, Failure> {
     if plan::file::is_plan(&input.bytes) {
         terminal::error(Code::Foreign, &format!("{} is a plan, not a drawing", input.path));
+        return Err(Failure::Refused);
+    }
+    if input.bytes.iter().all(u8::is_ascii_whitespace) {
+        let what = if input.bytes.is_empty() { "is empty" } else { "holds blanks and line ends only" };
+        terminal::error(Code::NoInk, &format!("{} {what}", input.path));
         return Err(Failure::Refused);
     }
     let document = import::read(&input.bytes, options).map_err(|error| match error {
@@ -276,7 +296,8 @@ pub(crate) fn refuse_unusable(name: &str, document: &Document) -> Result<(), Fai
         return Err(Failure::Refused);
     }
     if document.pages.iter().all(|page| page.drawing.is_empty()) {
-        terminal::error(Code::NoInk, &format!("{name} draws nothing"));
+        let size = &document.size;
+        terminal::error(Code::NoInk, &format!("{name} draws nothing: no ink in its {size}"));
         return Err(Failure::Refused);
     }
     Ok(())

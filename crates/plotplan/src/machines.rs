@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use compiler::machine_file::{MachineFile, PRESETS, nearest};
+use compiler::machine_file::{MachineFile, MachineFileError, PRESETS, nearest};
 use compiler::paper;
 use compiler::report::{ListedMachine, MachineSource};
 use kinematics::Machine;
@@ -19,18 +19,31 @@ pub(crate) struct LoadedMachine {
 
 /// A machine that cannot be used, as the context of the reason.
 #[derive(Clone, Debug, thiserror::Error)]
-#[error("machine {name} cannot be used")]
+#[error("machine {name} cannot be used{}", line.map(|line| format!(": line {line}")).unwrap_or_default())]
 pub(crate) struct Unusable {
     /// Its name or file, as given.
     pub(crate) name: String,
+    /// The line of the file, where the reason does not give it.
+    pub(crate) line: Option<usize>,
+}
+
+impl Unusable {
+    /// The failure of a machine file for this reason.
+    fn because(name: &str, toml: &str, error: MachineFileError) -> Failure {
+        let line = match &error {
+            MachineFileError::Syntax(_) => None,
+            other => other.line_in(toml),
+        };
+        Failure::Usage(anyhow::Error::new(error).context(Self { name: name.to_owned(), line }))
+    }
 }
 
 /// The machine that `--machine` names: a preset, or a machine file.
 pub(crate) fn machine(name: &str) -> Result<LoadedMachine, Failure> {
     let toml = machine_toml(name)?;
-    let wrong = || Unusable { name: name.to_owned() };
-    let file = MachineFile::parse(&toml).with_context(wrong).map_err(Failure::Usage)?;
-    let machine = file.machine().with_context(wrong).map_err(Failure::Usage)?;
+    let wrong = |error| Unusable::because(name, &toml, error);
+    let file = MachineFile::parse(&toml).map_err(wrong)?;
+    let machine = file.machine().map_err(wrong)?;
     Ok(LoadedMachine { file, machine })
 }
 

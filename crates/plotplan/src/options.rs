@@ -225,11 +225,13 @@ fn drawing(options: &Given<'_>) -> Option<String> {
         return planning(options);
     }
     let why = "without --machine";
-    let paper = options.has_machine_paper().then(|| format!("--paper has no effect {why}"));
+    if options.has_machine_paper() {
+        // The drawing is placed on that sheet.
+        return options.refuse(&PLANNING, why).or_else(|| margin(options));
+    }
     options
         .refuse(&PLANNING, why)
-        .or_else(|| options.refuse(&PLACEMENT, why))
-        .or(paper)
+        .or_else(|| options.refuse(&PLACEMENT, "without --machine or --paper"))
         .or_else(|| sheet(options))
 }
 

@@ -10,7 +10,7 @@ use compiler::import::{Diagnostic, Severity};
 use compiler::pipeline::Step;
 use compiler::report::{Code, ErrorReport, Finding, Place};
 use drawing::Span;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use crate::cli::MessageFormat;
 use crate::input::Input;
@@ -318,16 +318,16 @@ impl Progress {
     pub(crate) fn step(&self, step: Step) {
         let (name, done, all) = match step {
             Step::Placing => ("placing the drawing", 0, 0),
-            Step::Ordering => ("ordering strokes", 0, 0),
+            Step::Ordering(done, all) => ("ordering strokes", done, all),
             Step::Planning(done, all) => ("planning motion", done as u64, all as u64),
             Step::Verifying(done, all) => ("verifying", done, all),
         };
         if self.step.replace(name) != name {
             // Steps without a count of their own show the time that they take.
             let template =
-                if all > 0 { "{spinner} {msg} {percent} %, {eta} left" } else { "{spinner} {msg} {elapsed}" };
+                if all > 0 { "{spinner} {msg} {percent} %{left}" } else { "{spinner} {msg} {elapsed}" };
             if let Ok(style) = ProgressStyle::with_template(template) {
-                self.bar.set_style(style);
+                self.bar.set_style(style.with_key("left", time_left));
             }
             self.bar.set_message(name);
             self.bar.reset_elapsed();
@@ -339,6 +339,14 @@ impl Progress {
 
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// The time left, once there is something to estimate it from.
+fn time_left(state: &ProgressState, text: &mut dyn std::fmt::Write) {
+    let eta = state.eta();
+    if state.pos() > 0 && !eta.is_zero() {
+        let _ = write!(text, ", {:#} left", HumanDuration(eta));
     }
 }
 

@@ -9,9 +9,11 @@
 mod dir;
 pub mod machines;
 pub mod mechanisms;
+mod program;
 mod random;
 mod strokes;
 
 pub use dir::TestDir;
+pub use program::{Program, stderr, stdout};
 pub use random::Random;
 pub use strokes::{distance_to_polyline, polyline};

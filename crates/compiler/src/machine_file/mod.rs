@@ -6,6 +6,7 @@
 mod drive;
 mod edit;
 mod error;
+mod line;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

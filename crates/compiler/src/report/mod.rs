@@ -24,7 +24,7 @@ pub use self::input::{
     DrawingReport, FactReport, MotorLimits, PageReport, PenReport, PlanReport, ProgramReport,
 };
 pub use self::machine::{ListedMachine, MachineMotor, MachineReport, MachineSource, SheetReport};
-pub use self::sending::{SendEnd, SendReport};
+pub use self::sending::{SendEnd, SendReport, SendUnit};
 pub use self::summary::{Ordering, Summary};
 
 use crate::import::Diagnostic;
@@ -113,15 +113,15 @@ pub struct ArrangedReport {
 }
 
 impl ArrangedReport {
-    /// The report of a drawing.
-    pub fn of(arranged: &Arranged) -> Self {
+    /// The report of a drawing. `by_time`: its order was found by time on a machine.
+    pub fn of(arranged: &Arranged, by_time: bool) -> Self {
         let drawing = &arranged.drawing;
         Self {
             strokes: drawing.strokes.len(),
             ink_mm: round::mm(drawing.length()),
             pens: drawing.pens().iter().map(|pen| pen.0).collect(),
             beyond_sheet_mm: round::mm(arranged.beyond_sheet_mm),
-            ordering: arranged.ordering.as_ref().map(Ordering::of),
+            ordering: arranged.ordering.as_ref().map(|report| Ordering::of(report, by_time)),
         }
     }
 }

@@ -15,6 +15,16 @@ pub enum SendEnd {
     Failed,
 }
 
+/// What a transmission is counted in, and can be resumed at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SendUnit {
+    /// Rows of a plan.
+    Row,
+    /// Strokes of a drawing for an HP plotter.
+    Stroke,
+}
+
 /// What was sent.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct SendReport {
@@ -32,9 +42,11 @@ pub struct SendReport {
     pub retransmitted: u64,
     /// Whether the machine acknowledged anything.
     pub acknowledged: bool,
-    /// Row up to which everything was acknowledged.
+    /// What `row` and `last_sent_row` count.
+    pub unit: SendUnit,
+    /// Row or stroke up to which everything was acknowledged.
     pub row: u64,
-    /// Row that the machine may have reached.
+    /// Row or stroke that the machine may have reached.
     pub last_sent_row: u64,
     /// The command that resumes; `null` after the end.
     pub resume: Option<String>,

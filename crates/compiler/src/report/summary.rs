@@ -67,10 +67,11 @@ pub struct Ordering {
     pub travel_mm_before: f64,
     /// Travel in the order drawn, mm.
     pub travel_mm_after: f64,
-    /// Travel with lifts and drops in the file's order, s.
-    pub travel_s_before: f64,
-    /// Travel with lifts and drops in the order drawn, s.
-    pub travel_s_after: f64,
+    /// Travel with lifts and drops in the file's order, s; `null` without a machine, where the order is
+    /// found by length.
+    pub travel_s_before: Option<f64>,
+    /// Travel with lifts and drops in the order drawn, s; `null` likewise.
+    pub travel_s_after: Option<f64>,
 }
 
 impl Summary {
@@ -99,13 +100,14 @@ impl Summary {
             pen_up_share: round::share((times.travel_s + times.lifting_s) / duration_s),
             placement: compiled.placement.as_coeffs().map(round::coefficient),
             pen_changes: text::pen_changes(compiled.ordered()),
-            ordering: compiled.ordering.as_ref().map(Ordering::of),
+            ordering: compiled.ordering.as_ref().map(|report| Ordering::of(report, true)),
         }
     }
 }
 
 impl Ordering {
-    pub(super) fn of(report: &ordering::Report) -> Self {
+    /// `by_time`: the cost is a time, s; otherwise a length, mm.
+    pub(super) fn of(report: &ordering::Report, by_time: bool) -> Self {
         Self {
             strokes_before: report.strokes_before,
             strokes_after: report.strokes_after,
@@ -113,8 +115,8 @@ impl Ordering {
             duplicates_removed: report.duplicates_removed,
             travel_mm_before: round::mm(report.travel_mm_before),
             travel_mm_after: round::mm(report.travel_mm_after),
-            travel_s_before: round::s(report.travel_cost_before),
-            travel_s_after: round::s(report.travel_cost_after),
+            travel_s_before: by_time.then(|| round::s(report.travel_cost_before)),
+            travel_s_after: by_time.then(|| round::s(report.travel_cost_after)),
         }
     }
 }

@@ -22,7 +22,7 @@ pub fn summary(machine: &Machine, compiled: &Compiled<'_>) -> String {
         length(certificate.ink_mm)
     );
     if compiled.strokes != strokes {
-        let _ = write!(text, " in {} pen downs", compiled.strokes);
+        let _ = write!(text, " in {}", pluralize(compiled.strokes, "pen down"));
     }
     let [a, b, ..] = compiled.placement.as_coeffs();
     let scale = libm::hypot(a, b);
@@ -113,14 +113,18 @@ fn details(certificate: &Certificate) -> String {
         "  drawing resolution of this machine here (half a tick): {:.4} mm worst, {:.4} mm RMS",
         certificate.quantization_error.worst_mm, certificate.quantization_error.rms_mm
     );
+    // Whole ticks alone do not separate the motion from its rounding.
+    if certificate.motors.iter().any(|peak| peak.speed_ticks_s.is_none()) {
+        text.push_str(
+            "  shares of limits are taken from whole ticks, with the rounding error added to each limit\n",
+        );
+    }
     for peak in &certificate.motors {
         let _ = write!(
             text,
-            "  motor {}: speed at most {:.1} % of its limit{} (99.9 %: {:.1}), acceleration {:.1} % (99.9 %: {:.1})",
+            "  motor {}: speed at most {:.1} % of its limit (99.9 %: {:.1}), acceleration {:.1} % (99.9 %: {:.1})",
             peak.name,
             100.0 * peak.speed_share,
-            // Whole ticks alone do not tell the motion from its rounding.
-            if peak.speed_ticks_s.is_some() { "" } else { " plus rounding" },
             100.0 * peak.speed_share_p999,
             100.0 * peak.acceleration_share,
             100.0 * peak.acceleration_share_p999

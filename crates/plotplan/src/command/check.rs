@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 
-use compiler::pipeline;
+use compiler::pipeline::{self, Target};
 use compiler::report::text::{length, pluralize};
 use compiler::report::{Code, DrawingReport, MachineReport};
 use kinematics::Machine;
 
+use super::convert::{self, clean};
 use crate::cli::Check;
 use crate::failure::Failure;
 use crate::input::{Inputs, LoadedDrawing};
@@ -22,7 +23,8 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     let inputs = Inputs::read(std::slice::from_ref(&arguments.file))?;
     let input = inputs.first();
     let mut drawn = input::drawing(input, &arguments.reading)?;
-    if machine.is_none() {
+    let target = clean::target(machine.as_ref().map(|loaded| &loaded.machine), &arguments.reading)?;
+    if matches!(target, Target::Plane) {
         drawn.crop(arguments.reading.layout.crop);
     }
     let document = &drawn.document;
@@ -52,7 +54,11 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
     }
     let verdict = match &machine {
         Some(machine) => placed(arguments, &inputs, &drawn, &machine.machine, &mut text),
-        None => input::refuse_unusable(&input.path, document),
+        None => {
+            let planning = &arguments.planning;
+            clean::on_sheet(&inputs, &drawn, planning, &arguments.reading, target)
+                .map(|on| text.push_str(&on))
+        }
     };
     output::report(&text)?;
     verdict
@@ -78,8 +84,7 @@ fn placed(
             ..MachineReport::of(machine)
         });
     });
-    let placed =
-        placed.map_err(|error| super::convert::explain(inputs, drawing, machine, &request, error))?;
+    let placed = placed.map_err(|error| convert::explain(inputs, drawing, machine, &request, error))?;
     let _ = writeln!(text, "{} can draw it", machine.name());
     let beyond = placed.beyond_sheet_mm;
     if beyond > 1e-6 {

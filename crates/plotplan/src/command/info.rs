@@ -5,12 +5,14 @@ use std::fmt::Write as _;
 
 use backends::gcode;
 use compiler::import::{Diagnostic, Fact};
+use compiler::pipeline::Target;
 use compiler::replay;
 use compiler::report::text::{self, duration, length, pluralize};
 use compiler::report::{CertificateReport, DrawingReport, PlanReport, ProgramReport, Summary};
 use drawing::Rect;
 use kinematics::Machine;
 
+use super::convert::{self, clean};
 use crate::cli::Info;
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs, LoadedDrawing};
@@ -41,7 +43,8 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<(), Failure> {
         .map(|name| machines::machine_with_paper(name, &arguments.reading))
         .transpose()?;
     let mut drawn = input::drawing(input, &arguments.reading)?;
-    if machine.is_none() {
+    let target = clean::target(machine.as_ref().map(|loaded| &loaded.machine), &arguments.reading)?;
+    if matches!(target, Target::Plane) {
         drawn.crop(arguments.reading.layout.crop);
     }
     let document = &drawn.document;
@@ -96,7 +99,7 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<(), Failure> {
     text.push_str(&findings(&document.diagnostics));
     let planned = match machine {
         Some(machine) => planned(arguments, inputs, &drawn, &machine.machine),
-        None => input::refuse_unusable(&input.path, document).map(|()| String::new()),
+        None => clean::on_sheet(inputs, &drawn, &arguments.planning, &arguments.reading, target),
     };
     text.push_str(planned.as_deref().unwrap_or_default());
     output::report(&text)?;
@@ -113,7 +116,7 @@ fn planned(
     input::use_page(inputs, drawn, &arguments.reading)?;
     let crop = arguments.reading.layout.crop;
     let request = super::request(&arguments.planning, crop, drawn.page(), machine);
-    let compiled = super::convert::compile(inputs, drawn.drawing(), machine, &request)?;
+    let compiled = convert::compile(inputs, drawn.drawing(), machine, &request)?;
     session::report(|report| {
         report.summary = Some(Summary::of(&compiled));
         report.certificate = Some(CertificateReport::of(&compiled.certificate));
@@ -169,7 +172,7 @@ fn of_program(input: &Input, program: &str) -> String {
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
     options::refuse_on_plan()?;
-    let (plan, machine) = super::verify::plan(input, machine)?;
+    let (plan, machine) = super::verify::plan_on_its_machine(input, machine)?;
     let header = &plan.table.header;
     let mut text = format!("plan     {}\n", input.path);
     let _ = writeln!(text, "machine  {}", header.machine);
@@ -187,6 +190,8 @@ fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
     session::report(|report| report.plan = Some(PlanReport::of(header, &certificate)));
     let _ = writeln!(text, "ink      {}", length(certificate.ink_mm));
     let _ = writeln!(text, "travel   {}", length(certificate.travel_mm));
-    let _ = writeln!(text, "pens     {:?}, down {} times", certificate.pens, certificate.pen_downs);
+    let pens: Vec<String> = certificate.pens.iter().map(ToString::to_string).collect();
+    let downs = pluralize(certificate.pen_downs as usize, "pen down");
+    let _ = writeln!(text, "pens     {}, {downs}", pens.join(", "));
     Ok(text)
 }

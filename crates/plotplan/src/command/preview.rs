@@ -112,7 +112,7 @@ fn of_drawing(inputs: &Inputs, arguments: &Preview) -> Result<Scene, Failure> {
 
 fn of_plan(input: &Input, machine: Option<&str>) -> Result<Scene, Failure> {
     options::refuse_on_plan()?;
-    let (plan, machine) = super::verify::plan(input, machine)?;
+    let (plan, machine) = super::verify::plan_on_its_machine(input, machine)?;
     let machine = &machine.machine;
     let title = format!("{} on {}", input.name, machine.name());
     Ok(scene::of_plan(&title, &plan.table.rows, machine, plan.table.header.pen_colors))

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use backends::pen_plotter::plotter::{Handshake, Plotter};
 use backends::{Backend, Outcome, PlanSource, Program, ProgramError, RowIter, Session, SessionOptions};
 use compiler::import;
-use compiler::report::{Code, SendEnd, SendReport};
+use compiler::report::{Code, SendEnd, SendReport, SendUnit};
 use plan::TickTable;
 use serialport::FlowControl;
 
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     };
     // Standard input has the plan, or the operator's keys.
     let outcome = wire.run(&mut *session, arguments.reconnect, arguments.plan != "-");
-    session::report(|report| report.sending = Some(sent(arguments, path, &outcome, &*session)));
+    session::report(|report| report.sending = Some(sent(arguments, path, backend, &outcome, &*session)));
     report(&outcome, &*session, wire.is_interrupted(), backend.row_name())
 }
 
@@ -183,7 +183,13 @@ fn dry_run(arguments: &Send, program: &Program) -> Result<(), Failure> {
 }
 
 /// What was sent, for the report.
-fn sent(arguments: &Send, port: &str, outcome: &Outcome, session: &dyn Session) -> SendReport {
+fn sent(
+    arguments: &Send,
+    port: &str,
+    backend: &dyn Backend,
+    outcome: &Outcome,
+    session: &dyn Session,
+) -> SendReport {
     let progress = session.progress();
     let (end, row) = match outcome {
         Outcome::Done => (SendEnd::Done, None),
@@ -198,6 +204,7 @@ fn sent(arguments: &Send, port: &str, outcome: &Outcome, session: &dyn Session) 
         of_lines: progress.of_lines,
         retransmitted: progress.retransmitted,
         acknowledged: progress.acknowledged,
+        unit: if backend.row_name() == "stroke" { SendUnit::Stroke } else { SendUnit::Row },
         row: row.unwrap_or(progress.row),
         last_sent_row: progress.last_sent_row,
         resume: row.map(resume_command),

@@ -3,7 +3,9 @@
 //! The machine decides: its limits, joints and pen times are verified, never those that the plan
 //! states. Where the two differ, that is reported.
 
+use ::verify::Mismatch;
 use anyhow::Context as _;
+use compiler::import::{self, ImportError};
 use compiler::machine_file::MachineFile;
 use compiler::report::{CertificateReport, Code, ErrorReport, text};
 use compiler::{layout, replay};
@@ -27,7 +29,7 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
     let (plan, machine) = plan(&input, arguments.machine.as_deref())?;
     let machine = machines::with_paper(machine, &arguments.reading)?;
     let mut mismatches: Vec<String> =
-        verify::mismatches(&machine.machine, &plan.table.header).iter().map(ToString::to_string).collect();
+        ::verify::mismatches(&machine.machine, &plan.table.header).iter().map(ToString::to_string).collect();
     let drawing = if arguments.drawing.is_empty() {
         None
     } else {
@@ -80,9 +82,49 @@ fn other_drawing(plan: &PlanFile, drawing: &Inputs) -> Option<String> {
     })
 }
 
+/// As [`plan`], for commands that show the plan on its machine. Stops if the machine's motors are not
+/// those of the plan, and warns if it has another name.
+pub(super) fn plan_on_its_machine(
+    input: &Input,
+    machine: Option<&str>,
+) -> Result<(PlanFile, LoadedMachine), Failure> {
+    let (plan, machine) = plan(input, machine)?;
+    let found = ::verify::mismatches(&machine.machine, &plan.table.header);
+    let name = found.iter().find(|found| matches!(found, Mismatch::MachineName { .. }));
+    let motor = found.iter().find(|found| matches!(found, Mismatch::MotorName { .. }));
+    match (motor, name) {
+        (Some(motor), name) => {
+            Err(Failure::Usage(anyhow::anyhow!("{}: {}", input.path, name.unwrap_or(motor))))
+        }
+        (None, Some(name)) => {
+            terminal::warning(Code::PlanMismatch, &name.to_string());
+            Ok((plan, machine))
+        }
+        (None, None) => Ok((plan, machine)),
+    }
+}
+
+/// Why a file that is no plan is none, if it is a drawing or a file of another kind.
+fn other_kind(bytes: &[u8]) -> Option<String> {
+    match import::read(bytes, &import::Options::default()) {
+        Ok(document) if document.pages.iter().any(|page| !page.drawing.is_empty()) => Some(format!(
+            "is a drawing ({}), not a plan: `plotplan convert` makes a plan of it",
+            document.format
+        )),
+        Err(error @ ImportError::Foreign { .. }) => Some(format!("is not a plan: {error}")),
+        _ => None,
+    }
+}
+
 /// Reads a plan and finds its machine: the one named on the command line, the one in the plan document, or the preset of
 /// its name.
 pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, LoadedMachine), Failure> {
+    if !plan::file::is_plan(&input.bytes)
+        && let Some(what) = other_kind(&input.bytes)
+    {
+        terminal::error(Code::NotAPlan, &format!("{} {what}", input.path));
+        return Err(Failure::Refused);
+    }
     let plan = plan::file::read(&input.bytes)
         .with_context(|| format!("{} is not a plan that can be used", input.path))
         .map_err(Failure::Drawing)?;

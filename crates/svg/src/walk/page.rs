@@ -104,10 +104,10 @@ impl<'a> Walker<'a, '_> {
         let size = ["width", "height"].map(|name| absolute_mm(length(name)?, px_mm));
         let view = viewport::view_box(root);
         if size.iter().any(Option::is_none) {
-            let message = if view.is_some() {
-                "width or height is not given: the viewBox is taken in pixels"
-            } else {
-                "neither size nor viewBox is given: lengths are pixels"
+            let message = match (size, view.is_some()) {
+                ([None, None], true) => "neither width nor height is given: the viewBox is taken in pixels",
+                (_, true) => "only one of width and height is given: the viewBox gives the other one",
+                (_, false) => "size and viewBox are not given: lengths are pixels",
             };
             self.note(codes::SIZE_ASSUMED, "", root, message);
         }

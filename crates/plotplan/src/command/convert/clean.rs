@@ -6,7 +6,7 @@ use backends::pen_plotter::plotter::Sheet;
 use backends::pen_plotter::{self, PlotterLimit};
 use compiler::import::Page;
 use compiler::paper;
-use compiler::pipeline::{self, Arranged, Target};
+use compiler::pipeline::{self, Arranged, Order, Target};
 use compiler::report::text::{length, pluralize};
 use compiler::report::{ArrangedReport, Code, OutputReport};
 use compiler::scene;
@@ -14,10 +14,10 @@ use drawing::Rect;
 use kinematics::Machine;
 
 use super::{Job, Written};
-use crate::cli::{Format, Reading};
+use crate::cli::{Format, Planning, Reading};
 use crate::command;
 use crate::failure::Failure;
-use crate::input::{self, Inputs};
+use crate::input::{self, Inputs, LoadedDrawing};
 use crate::{output, session, terminal};
 
 /// Places, crops and orders the drawing of a page, and writes it.
@@ -61,7 +61,7 @@ pub(super) fn write(job: &Job<'_>, inputs: &Inputs, page: &Page, to: &str) -> Re
     session::report(|report| {
         report.outputs.push(OutputReport {
             file: to.to_owned(),
-            drawing: Some(ArrangedReport::of(&arranged)),
+            drawing: Some(ArrangedReport::of(&arranged, machine.is_some())),
             summary: None,
             certificate: None,
         });
@@ -114,6 +114,43 @@ pub(in crate::command) fn target<'a>(
 pub(in crate::command) fn page_rect(target: Target<'_>) -> Option<Rect> {
     let size = target.sheet().size();
     (size.width.is_finite() && size.height.is_finite()).then(|| Rect::from_origin_size((0.0, 0.0), size))
+}
+
+/// For `check` and `info` without a machine: where the drawing lies on the sheet of `--paper`, if there
+/// is one. Stops if the drawing cannot be used.
+pub(in crate::command) fn on_sheet(
+    inputs: &Inputs,
+    drawn: &LoadedDrawing,
+    planning: &Planning,
+    reading: &Reading,
+    target: Target<'_>,
+) -> Result<String, Failure> {
+    if matches!(target, Target::Plane) {
+        input::refuse_unusable(&inputs.path(), &drawn.document)?;
+        return Ok(String::new());
+    }
+    input::use_page(inputs, drawn, reading)?;
+    let placement = command::placement(&planning.placement);
+    let arranged = pipeline::arrange(drawn.drawing(), target, &placement, reading.layout.crop, &Order::File);
+    let arranged = arranged.map_err(|error| super::refusal(inputs, error))?;
+    let size = target.sheet().size();
+    let mut text = format!("sheet    {} x {} mm: ", size.width, size.height);
+    match arranged.drawing.bounding_box() {
+        None => text.push_str("no ink on it\n"),
+        Some(ink) => {
+            let _ = writeln!(
+                text,
+                "ink from {:.2}, {:.2} to {:.2}, {:.2} mm{}",
+                ink.x0,
+                ink.y0,
+                ink.x1,
+                ink.y1,
+                if arranged.beyond_sheet_mm > 1e-6 { "" } else { ", all of it on the sheet" }
+            );
+        }
+    }
+    warn_beyond(&arranged, reading.strict)?;
+    Ok(text)
 }
 
 fn warn_beyond(arranged: &Arranged, strict: bool) -> Result<(), Failure> {
