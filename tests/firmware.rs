@@ -350,7 +350,7 @@ fn polar_ink(points: impl Iterator<Item = Point>) -> Lines {
 
 #[test]
 fn polar_csv_and_c_arrays_ink() {
-    let machine = ruler(Polar);
+    let machine = ruler(Polar::default());
     let plan = plan(ONE_STROKE, "polar", &[]);
     let drawing = placed(ONE_STROKE, &plan);
     let table = polar_points(&convert(ONE_STROKE, "polar", "polar-csv", &[]));

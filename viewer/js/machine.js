@@ -5,8 +5,10 @@
  * @typedef {[number, number, number]} Affine  constant, factor of joint 0, factor of joint 1
  */
 /**
- * A point of the machine: fixed, or at a distance and direction from an earlier point.
- * @typedef {{x: number, y: number} | {from: number, length_mm: Affine, angle_rad: Affine}} Anchor
+ * A point of the machine: fixed, at a distance and direction from an earlier point, or where circles
+ * about two earlier points cross.
+ * @typedef {{x: number, y: number} | {from: number, length_mm: Affine, angle_rad: Affine}
+ *   | {centers: [number, number], radii_mm: [Affine, Affine], is_left: boolean}} Anchor
  */
 /**
  * @typedef {object} Part
@@ -60,6 +62,15 @@ export function pose(machine) {
       if ("x" in anchor) {
         points[2 * k] = anchor.x;
         points[2 * k + 1] = anchor.y;
+      } else if ("centers" in anchor) {
+        const [first, second] = anchor.centers;
+        const [r1, r2] = anchor.radii_mm.map((radius) => affine(radius, q0, q1));
+        const [dx, dy] = [points[2 * second] - points[2 * first], points[2 * second + 1] - points[2 * first + 1]];
+        const d = Math.hypot(dx, dy);
+        const along = (r1 * r1 - r2 * r2 + d * d) / (2 * d);
+        const across = Math.sqrt(Math.max(0, r1 * r1 - along * along)) * (anchor.is_left ? 1 : -1);
+        points[2 * k] = points[2 * first] + (along * dx - across * dy) / d;
+        points[2 * k + 1] = points[2 * first + 1] + (along * dy + across * dx) / d;
       } else {
         const length = affine(anchor.length_mm, q0, q1);
         const angle = affine(anchor.angle_rad, q0, q1);

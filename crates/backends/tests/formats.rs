@@ -108,7 +108,8 @@ fn written() -> Vec<(&'static str, String)> {
     formats
         .map(|backend| {
             let polar = backend.name() == "joint-trajectory";
-            let mechanism: Arc<dyn Mechanism> = if polar { Arc::new(Polar) } else { Arc::new(Cartesian) };
+            let mechanism: Arc<dyn Mechanism> =
+                if polar { Arc::new(Polar::default()) } else { Arc::new(Cartesian) };
             // The board's own pen setting in place of a servo's.
             let encode = if backend.name().starts_with("ebb") { EncodeOptions::default() } else { encode };
             let mut bytes = Vec::new();

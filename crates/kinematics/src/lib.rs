@@ -65,7 +65,7 @@ mod workspace;
 pub use coupling::{Coupling, SingularCoupling};
 pub use linkage::{Anchor, JointAffine, Linkage, Part, PartKind};
 pub use machine::{JointRange, Machine, MachineError, MachineParts, Motor, PenLimits, Quantity};
-pub use mechanism::{Cartesian, JointKind, Mechanism, Polar, TwoLink, Unreachable};
+pub use mechanism::{Cartesian, FiveBar, JointKind, Mechanism, Polar, Polargraph, TwoLink, Unreachable};
 pub use position::{JointPos, MotorPos};
 pub use reach::{Fault, OutOfReach};
 pub use workspace::reach_outlines;

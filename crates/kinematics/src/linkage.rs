@@ -30,6 +30,15 @@ pub enum Anchor {
         /// The direction, counterclockwise from +x, rad.
         angle_rad: JointAffine,
     },
+    /// It lies where two circles about earlier points cross.
+    Crossing {
+        /// Indices of their centres.
+        from: [usize; 2],
+        /// Their radii, mm.
+        radii_mm: [JointAffine; 2],
+        /// Whether it is on the left of the way from the first centre to the second.
+        is_left: bool,
+    },
 }
 
 /// An affine function of the joints: `constant + factors . q`.
@@ -103,10 +112,27 @@ impl Linkage {
                     let (sin, cos) = libm::sincos(angle_rad.at(q));
                     points[*from] + length_mm.at(q) * Vec2::new(cos, sin)
                 }
+                Anchor::Crossing { from, radii_mm, is_left } => {
+                    let centers = from.map(|index| points[index]);
+                    crossing(centers, radii_mm.each_ref().map(|radius| radius.at(q)), *is_left)
+                }
             });
         }
         points
     }
+}
+
+/// Where two circles cross, on one side of the way from centre to centre: with `d` the distance of the
+/// centres, `a = (r1² - r2² + d²) / (2 d)` along it and `sqrt(r1² - a²)` across. Circles that do not meet
+/// give the point between them.
+pub(crate) fn crossing([first, second]: [Point; 2], [r1, r2]: [f64; 2], is_left: bool) -> Point {
+    let between = second - first;
+    let d = between.hypot2().sqrt();
+    let along = between / d;
+    let a = ((r1 - r2) * (r1 + r2) + d * d) / (2.0 * d);
+    let across = ((r1 - a) * (r1 + a)).max(0.0).sqrt();
+    let side = if is_left { across } else { -across };
+    first + a * along + side * Vec2::new(-along.y, along.x)
 }
 
 /// A point at a distance and in a direction from an earlier one.

@@ -183,6 +183,12 @@ pub enum MachineError {
         /// The joint's name.
         joint: &'static str,
     },
+    /// The dimensions of the mechanism contradict each other.
+    #[error("[geometry]: {why}")]
+    Dimensions {
+        /// In which way.
+        why: &'static str,
+    },
     /// The sheet has no area.
     #[error("the sheet must have a positive width and height")]
     EmptySheet,

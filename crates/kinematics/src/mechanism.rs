@@ -4,8 +4,10 @@
 //! files are to know it. Nothing outside its file depends on which mechanism it is.
 
 mod cartesian;
+mod five_bar;
 mod parameters;
 mod polar;
+mod polargraph;
 mod two_link;
 
 use std::fmt::Debug;
@@ -13,14 +15,22 @@ use std::fmt::Debug;
 use drawing::{Line, Point, Rect, Vec2};
 
 pub use cartesian::Cartesian;
+pub use five_bar::FiveBar;
 pub use parameters::{Kind, ParameterError, Parameters};
 pub use polar::Polar;
+pub use polargraph::Polargraph;
 pub use two_link::TwoLink;
 
 use crate::{JointPos, Linkage, MachineError};
 
 /// The mechanisms that machine files can name.
-pub const KINDS: &[Kind] = &[Kind::of::<Cartesian>(), Kind::of::<TwoLink>(), Kind::of::<Polar>()];
+pub const KINDS: &[Kind] = &[
+    Kind::of::<Cartesian>(),
+    Kind::of::<TwoLink>(),
+    Kind::of::<Polar>(),
+    Kind::of::<FiveBar>(),
+    Kind::of::<Polargraph>(),
+];
 
 /// Why a point has no pose.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -31,6 +41,12 @@ pub enum Unreachable {
     /// Nearer to the base than the arm can fold; by this many mm.
     #[error("{0:.2} mm too near to the machine's base")]
     TooNear(f64),
+    /// The pen would be on the other side of the elbows: another assembly mode.
+    #[error("the pen would be on the other side of the line between the elbows")]
+    OtherAssembly,
+    /// A cord would not pull: beside or above the anchors, by this many mm.
+    #[error("{0:.2} mm beyond the anchors, where a cord is slack")]
+    Slack(f64),
 }
 
 /// What a joint does, and so the unit of its position.
@@ -47,7 +63,7 @@ pub enum JointKind {
 /// The inverse has one branch, which is part of the mechanism itself (an arm's elbow is on its left
 /// or on its right), so that it cannot flip while the pen is down.
 ///
-/// [`Cartesian`], [`TwoLink`] and [`Polar`] are built in; a program can plan for a mechanism of its
+/// The kinds of [`KINDS`] are built in; a program can plan for a mechanism of its
 /// own by implementing this trait. Every plan rests on the bounds promised here: the property suite
 /// in `tests/mechanisms.rs` tests each of them.
 pub trait Mechanism: Debug + Send + Sync {
@@ -125,6 +141,30 @@ pub trait Mechanism: Debug + Send + Sync {
     /// if there is one. Only lines that end there can be drawn near it: the first joint rests on them.
     fn pole(&self) -> Option<Point> {
         None
+    }
+
+    /// The middle of the mechanism: [`Self::base`], or between its bases.
+    fn center(&self) -> Point {
+        self.base().unwrap_or(Point::ZERO)
+    }
+
+    /// A box around the reach for pictures, mm: for one without an end, around its useful part. `None`
+    /// where only joint limits bound the reach.
+    fn reach_box(&self) -> Option<Rect> {
+        None
+    }
+
+    /// A distance from the pen, mm, within which every point can be reached without a jump of the
+    /// joints, at a [`Self::manipulability`] of at least `least`. At most 0 where the pose has less.
+    /// Infinite where [`Self::base`] (or nothing) decides that.
+    fn clearance_mm(&self, _q: &JointPos, _least: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Whether no pose is singular, or of another branch, while the joints move linearly from one pose
+    /// to the other; `false` also where that cannot be decided.
+    fn stays_regular(&self, _from: &JointPos, _to: &JointPos) -> bool {
+        true
     }
 
     /// Whether the pen's position is an affine function of the joints, so that its derivatives along

@@ -32,6 +32,12 @@ pub enum Fault {
         /// The smallest value that the machine allows.
         min: f64,
     },
+    /// The pen would be on the other side of the elbows: another assembly mode of a five-bar.
+    OtherAssembly,
+    /// A cord would not pull: beside or above its anchors, by this many mm.
+    Slack(f64),
+    /// The line passes between the bases of a five-bar.
+    BetweenBases,
 }
 
 impl From<Unreachable> for Fault {
@@ -39,6 +45,8 @@ impl From<Unreachable> for Fault {
         match unreachable {
             Unreachable::TooFar(by) => Self::TooFar(by),
             Unreachable::TooNear(by) => Self::TooNear(by),
+            Unreachable::OtherAssembly => Self::OtherAssembly,
+            Unreachable::Slack(by) => Self::Slack(by),
         }
     }
 }
@@ -57,6 +65,14 @@ impl std::fmt::Display for Fault {
             ),
             Self::TooFar(by) => write!(f, "it is {} mm beyond the machine's reach", readable(by)),
             Self::TooNear(by) => write!(f, "it is {by:.2} mm too near to the machine's base"),
+            Self::OtherAssembly => {
+                write!(
+                    f,
+                    "the pen would be on the other side of the line between the elbows (pen in [geometry])"
+                )
+            }
+            Self::Slack(by) => write!(f, "a cord would be slack: it is {by:.2} mm beyond the anchors"),
+            Self::BetweenBases => write!(f, "the line passes between the bases"),
             Self::JointLimit { joint, kind, value, min, max } => {
                 let (scale, unit) = match kind {
                     JointKind::Revolute => (180.0 / std::f64::consts::PI, "deg"),
@@ -117,10 +133,12 @@ impl Machine {
 
     /// Whether the pen may draw the whole segment, not only its ends.
     ///
-    /// On a straight line, the distance from the base (which alone decides the fold of an elbow, and so
+    /// On a straight line of a mechanism with a [`crate::Mechanism::base`], the distance from the base (which alone decides the fold of an elbow, and so
     /// reach and manipulability) is convex: it is extreme at an end or at the foot of the perpendicular
     /// from the base. Joints are monotone between these points and those of
-    /// [`crate::Mechanism::joint_extrema_on_line`]. Curves are checked as chords within 1e-3 mm.
+    /// [`crate::Mechanism::joint_extrema_on_line`]. Without a base, the check steps along the line, each
+    /// step as long as the clearance that the mechanism guarantees. Curves are checked as chords within
+    /// 1e-3 mm.
     ///
     /// A line through [`crate::Mechanism::pole`] is two lines that end there: the planner stops there
     /// with the pen up ([`Self::pole_on`]). On such a line the first joint rests at any distance.
@@ -209,6 +227,7 @@ impl Machine {
         {
             self.check_point(at(line, t))?;
         }
+        self.check_clearance(line)?;
         if self.parts().joints.iter().all(|joint| *joint == JointRange::FREE) {
             return Ok(());
         }
@@ -230,6 +249,44 @@ impl Machine {
             from = to;
         }
         Ok(())
+    }
+
+    /// Steps along a line by the clearance of each pose, at least by [`CHORD_TOLERANCE`]: there the
+    /// boundary of the reach is nearer than that.
+    fn check_clearance(&self, line: &Line) -> Result<(), OutOfReach> {
+        if self.mechanism().base().is_some() || self.mechanism().is_linear() {
+            return Ok(());
+        }
+        let (mechanism, least) = (self.mechanism(), self.parts().min_manipulability);
+        let length = (line.p1 - line.p0).hypot2().sqrt();
+        let out = |point, fault| Err(OutOfReach { point, fault });
+        let (mut t, mut last) = (0.0, None::<JointPos>);
+        loop {
+            let point = at(line, t);
+            let q = match self.pose_near(point, &last.unwrap_or(self.start())) {
+                Ok(q) => q,
+                Err(unreachable) => return out(point, unreachable.into()),
+            };
+            let clearance = mechanism.clearance_mm(&q, least);
+            if clearance == f64::INFINITY {
+                return Ok(());
+            }
+            let manipulability = mechanism.manipulability(&q);
+            if manipulability < least {
+                return out(point, Fault::Singular { manipulability, min: least });
+            }
+            let turned = |k: usize, last: JointPos| {
+                mechanism.joint_kinds()[k] == JointKind::Revolute && (q[k] - last[k]).abs() > LARGEST_STEP
+            };
+            if last.is_some_and(|last| turned(0, last) || turned(1, last)) {
+                return out(point, Fault::BetweenBases);
+            }
+            if t >= 1.0 || length == 0.0 {
+                return Ok(());
+            }
+            t = (t + clearance.max(CHORD_TOLERANCE) / length).min(1.0);
+            last = Some(q);
+        }
     }
 
     /// Checks the joint limits between two points of a line between which the joints are monotone. Both
@@ -264,6 +321,9 @@ const AT_POLE: f64 = 1e-6;
 
 /// The full rotations about the base that are tried on either side of a pose.
 const MOST_TURNS: i32 = 4;
+
+/// A joint that turns by more than this within the clearance of a pose has jumped, rad.
+const LARGEST_STEP: f64 = 3.0;
 
 /// Gaps between allowed turns are looked for down to this share of a line.
 const SMALLEST_GAP: f64 = 1e-9;

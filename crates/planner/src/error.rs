@@ -1,6 +1,6 @@
 //! Why a drawing cannot be planned.
 
-use drawing::{Pen, Span};
+use drawing::{Pen, Point, Span};
 use kinematics::OutOfReach;
 
 /// Why a drawing cannot be planned on a machine.
@@ -18,6 +18,17 @@ pub enum PlanError {
         span: Span,
         /// The point and the reason.
         source: OutOfReach,
+    },
+    /// The motors cannot move the pen from one stroke to another without passing a singular pose.
+    #[error(
+        "there is no way with the pen up from {:.1}, {:.1} mm to {:.1}, {:.1} mm: the mechanism would pass a \
+         singular pose", from.x, from.y, to.x, to.y
+    )]
+    NoTravel {
+        /// Where the pen is, machine mm.
+        from: Point,
+        /// Where it is to go, machine mm.
+        to: Point,
     },
     /// The drawing is empty.
     #[error("the drawing has no ink")]

@@ -405,7 +405,16 @@ pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f
         geometry.pen_velocity(&pose, &change).hypot2().sqrt()
     };
     let fastest = (0..=PARTS).map(speed).fold(0.0, f64::max);
-    fastest + 0.5 * geometry.second_derivative_bound(&from, &to) / f64::from(PARTS)
+    let bound = geometry.second_derivative_bound(&from, &to);
+    if bound.is_finite() {
+        return fastest + 0.5 * bound / f64::from(PARTS);
+    }
+    // Bounds that hold over a part only, where one over the whole way does not exist.
+    let part = |k: u32| {
+        let pose = |k: u32| from + f64::from(k) / f64::from(PARTS) * change;
+        geometry.second_derivative_bound(&pose(k), &pose(k + 1))
+    };
+    fastest + 0.5 * (0..PARTS).map(part).fold(0.0, f64::max) * f64::from(PARTS)
 }
 
 /// First and second derivatives of the motors with respect to `s`, at the piece's own parameter

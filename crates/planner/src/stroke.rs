@@ -4,10 +4,12 @@ use drawing::{Point, Stroke};
 use kinematics::{Fault, JointPos, Machine, OutOfReach, Unreachable};
 
 use crate::{
+    error::PlanError,
     joint_path::{JointPath, PathGeometry},
     path::{Limits, PathBudget, Piece, Section, bound_speed, fitted, sections, vertex_to_vertex},
     settings::{Settings, TimingLaw, ToleranceBudget},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile, rough_duration},
+    travel::waypoints,
 };
 
 /// Motion along a joint path from rest to rest. It takes a whole number of periods, so that stops
@@ -223,10 +225,26 @@ impl StrokePlanner<'_> {
         SpeedCap { pen_mm_s, row_deviation_mm: self.budget.row_mm, period_s: self.period() }
     }
 
-    /// The motion with the pen up between two poses; `None` if they are equal.
-    pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Option<PathMotion> {
-        let path = JointPath::travel(self.machine, from, to)?;
-        Some(self.parametrize(path, to, self.machine.pen().max_travel_speed_mm_s))
+    /// The motions with the pen up between two poses; none if they are equal, more than one where the
+    /// direct way would pass a singular pose.
+    ///
+    /// # Errors
+    /// When there is no way.
+    pub(crate) fn travel(&self, from: JointPos, to: JointPos) -> Result<Vec<PathMotion>, PlanError> {
+        let poses = waypoints(self.machine, from, to).ok_or_else(|| {
+            let [from, to] = [from, to].map(|pose| self.machine.mechanism().forward(&pose));
+            PlanError::NoTravel { from, to }
+        })?;
+        let mut motions = Vec::with_capacity(poses.len());
+        let mut from = from;
+        for to in poses {
+            let path = JointPath::travel(self.machine, from, to);
+            motions.extend(
+                path.map(|path| self.parametrize(path, to, self.machine.pen().max_travel_speed_mm_s)),
+            );
+            from = to;
+        }
+        Ok(motions)
     }
 
     /// Time between rows, s.

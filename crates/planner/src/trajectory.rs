@@ -324,7 +324,7 @@ impl Motions<'_> {
                 return Ok(None);
             } else {
                 self.finished = true;
-                self.travel(self.planner.machine.start());
+                self.travel(self.planner.machine.start())?;
             }
         }
         Ok(self.queue.pop_front())
@@ -341,7 +341,7 @@ impl Motions<'_> {
         let planned = self.planner.plan(stroke, &self.pose, candidate).map_err(|source| {
             PlanError::OutOfReach { stroke: index, pen: stroke.pen, span: stroke.source(), source }
         })?;
-        self.travel(planned.start);
+        self.travel(planned.start)?;
         if index == 0 && self.queue.is_empty() {
             // The first stroke starts at the start pose: the plan still starts with the pen up.
             self.queue.push_back(Motion::Pen { pen: 0, periods: 1 });
@@ -359,17 +359,21 @@ impl Motions<'_> {
 
     /// Lifts the pen if it is down, and travels. Travel overlaps with the lift by the time that the
     /// settings allow, at most by its own duration: the lift ends before the next drop begins.
-    fn travel(&mut self, to: JointPos) {
-        let travel = self.planner.travel(self.pose, to);
+    ///
+    /// # Errors
+    /// See [`StrokePlanner::travel`].
+    fn travel(&mut self, to: JointPos) -> Result<(), PlanError> {
+        let travel = self.planner.travel(self.pose, to)?;
         if std::mem::take(&mut self.is_down) {
             let whole = whole_periods(self.planner.machine.pen().lift_time_s, self.planner.period());
             let overlap =
                 (self.planner.settings.lift_overlap_s / self.planner.period() + 1e-9).floor() as u64;
-            let overlap = overlap.min(travel.as_ref().map_or(0, |travel| travel.periods));
+            let overlap = overlap.min(travel.iter().map(|travel| travel.periods).sum());
             self.queue.push_back(Motion::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
         }
-        self.queue.extend(travel.map(Motion::Path));
+        self.queue.extend(travel.into_iter().map(Motion::Path));
         self.pose = to;
+        Ok(())
     }
 
     /// Plans the next strokes in parallel, each from the pose in which the machine is predicted to

@@ -111,7 +111,7 @@ fn kind_of(error: &anyhow::Error) -> Option<Code> {
     error.chain().find_map(|cause| {
         if let Some(error) = cause.downcast_ref::<PlanError>() {
             return Some(match error {
-                PlanError::OutOfReach { .. } => Code::OutOfReach,
+                PlanError::OutOfReach { .. } | PlanError::NoTravel { .. } => Code::OutOfReach,
                 PlanError::NoInk => Code::NoInk,
                 PlanError::NoPlacement { .. } => Code::NoPlacement,
                 PlanError::TooManyRows { .. } => Code::TooLong,

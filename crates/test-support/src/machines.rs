@@ -87,7 +87,7 @@ pub fn polar() -> Machine {
         start: JointPos::new(FRAC_PI_2, 138.0),
         ..MachineParts::new(
             "test",
-            Polar,
+            Polar::default(),
             [
                 motor("theta", 1856.0 / PI, 2400.0, 1000.0, 6000.0),
                 motor("r", 360.0 / 44.0, -138.0 * 360.0 / 44.0, 360.0, 3600.0),
@@ -106,8 +106,8 @@ pub fn with_jerk(machine: &Machine, build_up_s: f64) -> Machine {
     build(parts)
 }
 
-/// Couplings: the identity, CoreXY, H-bot, elbow belts of ratio 0.4 to 3, a motor on the elbow, and
-/// any other matrix that is not nearly singular.
+/// Couplings: the identity, CoreXY, H-bot, elbow belts of ratio 0.4 to 3, open and crossed, a motor on
+/// the elbow, with or without a gear, and any other matrix that is not nearly singular.
 pub fn coupling() -> impl Strategy<Value = [[f64; 2]; 2]> {
     let regular = proptest::array::uniform4(-2.0..2.0f64)
         .prop_map(|[a, b, c, d]| [[a, b], [c, d]])
@@ -117,7 +117,9 @@ pub fn coupling() -> impl Strategy<Value = [[f64; 2]; 2]> {
         Just([[1.0, 1.0], [1.0, -1.0]]),
         Just([[1.0, 1.0], [-1.0, 1.0]]),
         Just([[1.0, 0.0], [-1.0, 1.0]]),
+        (-3.0..-0.4f64).prop_map(|gear| [[1.0, 0.0], [-gear, gear]]),
         (0.4..3.0f64).prop_map(|ratio| [[1.0, 0.0], [1.0 - 1.0 / ratio, 1.0 / ratio]]),
+        (-3.0..-0.4f64).prop_map(|crossed| [[1.0, 0.0], [1.0 - 1.0 / crossed, 1.0 / crossed]]),
         regular,
     ]
 }
@@ -190,11 +192,11 @@ pub fn machine() -> impl Strategy<Value = Machine> {
     )
 }
 
-/// A point in a direction from the base (or the origin), at a share of the distances at which the
+/// A point in a direction from the centre, at a share of the distances at which the
 /// manipulability is at least `least`.
 pub fn point_within(mechanism: &dyn Mechanism, direction: f64, share: f64, least: f64) -> Option<Point> {
     let (sin, cos) = libm::sincos(direction);
-    let base = mechanism.base().unwrap_or(Point::ZERO);
+    let base = mechanism.center();
     let at = |r: f64| base + r * Vec2::new(cos, sin);
     let good = |r: &f64| mechanism.inverse(at(*r)).is_ok_and(|q| mechanism.manipulability(&q) >= least);
     let distances: Vec<f64> = (1..1000).map(f64::from).filter(good).collect();

@@ -11,7 +11,7 @@ mod line;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use drawing::Rect;
+use drawing::{Point, Rect};
 use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
 use kinematics::{JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits};
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,7 @@ pub struct Preset {
 }
 
 /// The machines that come with plotplan.
-pub const PRESETS: [Preset; 5] = [
+pub const PRESETS: [Preset; 11] = [
     Preset {
         name: "coaxial",
         about: "two-link arm, both motors at the base, elbow driven through a belt; letter sheet",
@@ -59,6 +59,36 @@ pub const PRESETS: [Preset; 5] = [
         name: "cartesian",
         about: "plain x-y table, 300 x 300 mm, 80 steps/mm",
         toml: include_str!("../../machines/cartesian.toml"),
+    },
+    Preset {
+        name: "serial-arm",
+        about: "two-link arm with the second motor on its elbow (grbl-scara), A5 sheet",
+        toml: include_str!("../../machines/serial-arm.toml"),
+    },
+    Preset {
+        name: "scara",
+        about: "RepRapFirmware SCARA with crosstalk, both motors at the base, A7 sheet",
+        toml: include_str!("../../machines/scara.toml"),
+    },
+    Preset {
+        name: "brachiograph",
+        about: "BrachioGraph, an arm of two hobby servos, 140 x 90 mm",
+        toml: include_str!("../../machines/brachiograph.toml"),
+    },
+    Preset {
+        name: "five-bar",
+        about: "five-bar with two steppers, A6 sheet",
+        toml: include_str!("../../machines/five-bar.toml"),
+    },
+    Preset {
+        name: "polargraph",
+        about: "pen hanging from two cords (Polargraph), 650 mm wide, A4 sheet",
+        toml: include_str!("../../machines/polargraph.toml"),
+    },
+    Preset {
+        name: "axidraw",
+        about: "AxiDraw V3, 300 x 218 mm",
+        toml: include_str!("../../machines/axidraw.toml"),
     },
 ];
 
@@ -93,10 +123,14 @@ struct GeometryTable {
 
 /// A value in the `[geometry]` table: a number, or text, which may have a unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "expected a number, or text such as \"206mm\"")]
+#[serde(
+    untagged,
+    expecting = "expected a number, text such as \"206mm\", or a point such as [\"-40mm\", \"0mm\"]"
+)]
 enum Parameter {
     Number(f64),
     Text(String),
+    Point([String; 2]),
 }
 
 /// Values by the names of joints.
@@ -203,10 +237,7 @@ impl MachineFile {
     /// When a value is not of the unit that its key wants, or the parts do not make a machine.
     pub fn machine(&self) -> Result<Machine, MachineFileError> {
         let mechanism = self.geometry.mechanism().map_err(MachineFileError::Geometry)?;
-        let dimensions = mechanism.joint_kinds().map(|kind| match kind {
-            JointKind::Revolute => Dimension::Angle,
-            JointKind::Prismatic => Dimension::Length,
-        });
+        let dimensions = mechanism.joint_kinds().map(dimension);
         let names = mechanism.joint_names();
         let at = |key: String| move |source| MachineFileError::Quantity { key, source };
 
@@ -222,13 +253,7 @@ impl MachineFile {
                 max: value(&range.max, "max", f64::INFINITY)?,
             };
         }
-        let mut start = JointPos::ZERO;
-        for (k, value) in per_joint(&self.start, "start", &*mechanism)?.into_iter().enumerate() {
-            let text = value.ok_or_else(|| {
-                MachineFileError::Invalid(format!("[start] does not say where joint {} is", names[k]))
-            })?;
-            start[k] = dimensions[k].value(text).map_err(at(format!("start.{}", names[k])))?;
-        }
+        let start = self.start(&*mechanism)?;
         let [first, second] = self.motor.as_slice() else {
             return Err(MachineFileError::Invalid(format!(
                 "a machine has two motors, this file has {}",
@@ -243,10 +268,7 @@ impl MachineFile {
         let machine = Machine::new(MachineParts {
             name: self.name.clone(),
             joints,
-            min_manipulability: match self.geometry.table.get(MIN_MANIPULABILITY) {
-                Some(Parameter::Number(least)) => *least,
-                _ => mechanism.default_min_manipulability(),
-            },
+            min_manipulability: self.geometry.min_manipulability(&*mechanism)?,
             mechanism,
             coupling: self.coupling.matrix,
             motors: [first.motor()?, second.motor()?],
@@ -269,6 +291,31 @@ impl MachineFile {
         Ok(machine)
     }
 
+    /// The start pose: a value for each joint, or the place of the pen.
+    fn start(&self, mechanism: &dyn Mechanism) -> Result<JointPos, MachineFileError> {
+        let names = mechanism.joint_names();
+        let at = |key: String| move |source| MachineFileError::Quantity { key, source };
+        if let (2, Some(x), Some(y)) = (self.start.len(), self.start.get("x"), self.start.get("y"))
+            && names != ["x", "y"]
+        {
+            let length = |text: &str, key: &str| quantity::length_mm(text, false).map_err(at(key.to_owned()));
+            let pen = Point::new(length(x, "start.x")?, length(y, "start.y")?);
+            return mechanism.inverse(pen).map_err(|unreachable| {
+                let (x, y) = (pen.x, pen.y);
+                MachineFileError::Invalid(format!("the pen cannot start at {x}, {y} mm: {unreachable}"))
+            });
+        }
+        let mut start = JointPos::ZERO;
+        for (k, value) in per_joint(&self.start, "start", mechanism)?.into_iter().enumerate() {
+            let text = value.ok_or_else(|| {
+                MachineFileError::Invalid(format!("[start] does not say where joint {} is", names[k]))
+            })?;
+            let dimension = dimension(mechanism.joint_kinds()[k]);
+            start[k] = dimension.value(text).map_err(at(format!("start.{}", names[k])))?;
+        }
+        Ok(start)
+    }
+
     /// The drive of the machine, for simulations; `None` for a file without `[drive]`.
     ///
     /// # Errors
@@ -282,7 +329,34 @@ impl MachineFile {
 /// A key of every `[geometry]` table: [`MachineParts::min_manipulability`].
 const MIN_MANIPULABILITY: &str = "min_dexterity";
 
+/// The smallest value that it may have where a mechanism has singular poses: motors turn a thousand
+/// times as fast as elsewhere.
+const LEAST_MANIPULABILITY: f64 = 1e-3;
+
+/// What the values of a joint are.
+fn dimension(kind: JointKind) -> Dimension {
+    match kind {
+        JointKind::Revolute => Dimension::Angle,
+        JointKind::Prismatic => Dimension::Length,
+    }
+}
+
 impl GeometryTable {
+    fn min_manipulability(&self, mechanism: &dyn Mechanism) -> Result<f64, MachineFileError> {
+        let usual = mechanism.default_min_manipulability();
+        match self.table.get(MIN_MANIPULABILITY) {
+            Some(Parameter::Number(least)) if usual > 0.0 && *least < LEAST_MANIPULABILITY => {
+                Err(MachineFileError::Invalid(format!(
+                    "{MIN_MANIPULABILITY} must be at least {LEAST_MANIPULABILITY}, not {least}: at 0 the pose is \
+                     singular, and no motor speed is high enough to move the pen in every direction ({usual} is \
+                     usual)"
+                )))
+            }
+            Some(Parameter::Number(least)) => Ok(*least),
+            _ => Ok(usual),
+        }
+    }
+
     fn mechanism(&self) -> Result<Arc<dyn Mechanism>, ParameterError> {
         self.kind.mechanism(&mut TableReader(&self.table))
     }
@@ -297,7 +371,7 @@ impl TryFrom<BTreeMap<String, Parameter>> for GeometryTable {
             |names: &[&str]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
         let name = match table.get("kind") {
             Some(Parameter::Text(name)) => name,
-            Some(Parameter::Number(_)) => return Err("`kind` must be text".into()),
+            Some(_) => return Err("`kind` must be text".into()),
             None => return Err("missing field `kind`".into()),
         };
         let kind = *KINDS.iter().find(|kind| kind.name == name).ok_or_else(|| {
@@ -308,7 +382,7 @@ impl TryFrom<BTreeMap<String, Parameter>> for GeometryTable {
         if let Some(key) = table.keys().find(|key| !known.contains(&key.as_str())) {
             return Err(format!("unknown field `{key}`, expected one of {}", listed(&known)));
         }
-        if let Some(Parameter::Text(_)) = table.get(MIN_MANIPULABILITY) {
+        if let Some(Parameter::Text(_) | Parameter::Point(_)) = table.get(MIN_MANIPULABILITY) {
             return Err(format!("`{MIN_MANIPULABILITY}` must be a number"));
         }
         let geometry = Self { kind, table };
@@ -336,6 +410,10 @@ impl TableReader<'_> {
                 let reason = format!("{number} has no unit: write it as text, such as \"{number}mm\"");
                 Err(ParameterError::Unreadable { key, reason })
             }
+            Some(Parameter::Point(_)) => {
+                let reason = "it is one value, not a point of two".to_owned();
+                Err(ParameterError::Unreadable { key, reason })
+            }
             None => Err(ParameterError::Missing { key }),
         }
     }
@@ -345,6 +423,24 @@ impl Parameters for TableReader<'_> {
     fn length_mm(&mut self, key: &'static str) -> Result<f64, ParameterError> {
         let unreadable = |error: QuantityError| ParameterError::Unreadable { key, reason: error.to_string() };
         quantity::length_mm(self.text(key)?, false).map_err(unreadable)
+    }
+
+    fn optional_length_mm(&mut self, key: &'static str) -> Result<Option<f64>, ParameterError> {
+        if self.0.contains_key(key) { self.length_mm(key).map(Some) } else { Ok(None) }
+    }
+
+    fn point_mm(&mut self, key: &'static str) -> Result<Point, ParameterError> {
+        let unreadable = |reason: String| ParameterError::Unreadable { key, reason };
+        match self.0.get(key) {
+            Some(Parameter::Point(values)) => {
+                let length = |text: &str| {
+                    quantity::length_mm(text, false).map_err(|error| unreadable(error.to_string()))
+                };
+                Ok(Point::new(length(&values[0])?, length(&values[1])?))
+            }
+            Some(_) => Err(unreadable("a point is written as [\"-40mm\", \"0mm\"]".into())),
+            None => Err(ParameterError::Missing { key }),
+        }
     }
 
     fn choice(

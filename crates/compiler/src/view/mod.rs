@@ -338,6 +338,9 @@ fn machine(machine: &Machine) -> Value {
         Anchor::Moving { from, length_mm, angle_rad } => {
             json!({ "from": from, "length_mm": affine(length_mm), "angle_rad": affine(angle_rad) })
         }
+        Anchor::Crossing { from, radii_mm, is_left } => {
+            json!({ "centers": from, "radii_mm": radii_mm.each_ref().map(affine), "is_left": is_left })
+        }
     });
     let parts = linkage
         .parts

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use drawing::Point;
+
 use super::Mechanism;
 
 /// Named values with units, from which a mechanism is made. A reader of machine files implements it.
@@ -11,6 +13,18 @@ pub trait Parameters {
     /// # Errors
     /// When it is missing or not a length.
     fn length_mm(&mut self, key: &'static str) -> Result<f64, ParameterError>;
+
+    /// The length of this name, mm; `None` where it is not given.
+    ///
+    /// # Errors
+    /// When it is not a length.
+    fn optional_length_mm(&mut self, key: &'static str) -> Result<Option<f64>, ParameterError>;
+
+    /// The point of this name, machine mm.
+    ///
+    /// # Errors
+    /// When it is missing or not two lengths.
+    fn point_mm(&mut self, key: &'static str) -> Result<Point, ParameterError>;
 
     /// Which of `choices` the parameter of this name is, as an index.
     ///

@@ -178,21 +178,34 @@ impl Mechanism for TwoLink {
     /// the elbow is at the distance d -+ L2 along n and on the circle about the base; in the second it
     /// is at +-L1 n, and the pen on the circle about it.
     fn joint_extrema_on_line(&self, line: &Line) -> Vec<f64> {
-        let Self { l1_mm: l1, l2_mm: l2, .. } = *self;
-        let along = line.p1 - line.p0;
-        let length = along.hypot2().sqrt();
-        let u = along / length;
-        let (start, d) = (line.p0.to_vec2().dot(u), line.p0.to_vec2().dot(Vec2::new(-u.y, u.x)));
         let mut extrema = Vec::with_capacity(8);
-        for (offset, radius) in [(d - l2, l1), (d + l2, l1), (d - l1, l2), (d + l1, l2)] {
-            let square = radius * radius - offset * offset;
-            if square >= 0.0 {
-                let x = square.sqrt();
-                extrema.extend([(-x - start) / length, (x - start) / length]);
-            }
-        }
+        extrema.extend(perpendicular_distal(line, self.l1_mm, self.l2_mm));
+        extrema.extend(perpendicular_distal(line, self.l2_mm, self.l1_mm));
         extrema
     }
+
+    fn reach_box(&self) -> Option<Rect> {
+        let reach = self.l1_mm + self.l2_mm;
+        Some(Rect::from_center_size(Point::ZERO, (2.0 * reach, 2.0 * reach)))
+    }
+}
+
+/// Where the distal link is perpendicular to a line on which the pen is, as parameters of the line: the
+/// elbow, at the distance `d -+ distal` along its normal, is on the circle of `proximal` about the origin.
+pub(super) fn perpendicular_distal(
+    line: &Line,
+    proximal: f64,
+    distal: f64,
+) -> impl Iterator<Item = f64> + use<> {
+    let along = line.p1 - line.p0;
+    let length = along.hypot2().sqrt();
+    let u = along / length;
+    let (start, d) = (line.p0.to_vec2().dot(u), line.p0.to_vec2().dot(Vec2::new(-u.y, u.x)));
+    [d - distal, d + distal]
+        .into_iter()
+        .map(move |offset| proximal * proximal - offset * offset)
+        .filter(|square| *square >= 0.0)
+        .flat_map(move |square| [-square.sqrt(), square.sqrt()].map(|x| (x - start) / length))
 }
 
 impl FromParameters for TwoLink {

@@ -69,7 +69,7 @@ pub fn arm() -> Machine {
 /// Angle and radius, the angle in steps of 1/2000 rad.
 pub fn polar() -> Machine {
     let motors = [motor("phi", 2000.0, 0.0, 4e3, 4e4), motor("r", 100.0, 0.0, 1e4, 1e5)];
-    Machine::new(parts("polar", Polar, motors, JointPos::new(0.5, 60.0))).expect("a sound machine")
+    Machine::new(parts("polar", Polar::default(), motors, JointPos::new(0.5, 60.0))).expect("a sound machine")
 }
 
 /// The header of a plan for a machine.
