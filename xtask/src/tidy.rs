@@ -18,11 +18,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("planner", &["drawing", "kinematics", "plan"]),
     ("verify", &["drawing", "kinematics", "plan"]),
     ("simulation", &["drawing", "kinematics", "plan"]),
+    ("calibration", &["drawing", "kinematics"]),
     ("picture", &["drawing", "plan"]),
     ("backends", &["drawing", "hpgl", "kinematics", "plan"]),
     (
         "compiler",
         &[
+            "calibration",
             "drawing",
             "hpgl",
             "kinematics",
@@ -40,6 +42,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "plotplan",
         &[
             "backends",
+            "calibration",
             "compiler",
             "drawing",
             "hpgl",
