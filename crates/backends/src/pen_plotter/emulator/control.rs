@@ -5,6 +5,8 @@
 pub(super) enum Received {
     /// A byte of HP-GL.
     Text(u8),
+    /// A byte that is passed on to the terminal: the plotter is off.
+    Passed(u8),
     /// Part of a sequence, or one without an answer.
     Nothing,
     /// `ESC.B`.
@@ -43,17 +45,26 @@ const ENQ: u8 = 0x05;
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the machine")]
 pub(super) struct Control {
     parsing: Parsing,
-    /// Off: everything but ESC.( is passed on to the terminal.
+    /// Off: everything but device control is passed on to the terminal.
     is_off: bool,
     /// DTR is used.
     pub(super) hardwire: bool,
     /// Free bytes at which the sender is stopped.
     pub(super) block: usize,
     enquiry: u8,
+    /// Text is kept until `ESC.E` ends the block.
+    pub(super) block_mode: bool,
     /// XON, if XON/XOFF is on.
     xon: Option<u8>,
-    xoff: Option<u8>,
+    /// What stops the sender: XOFF, or the immediate answer to an enquiry that has to wait.
+    stop: Vec<u8>,
+    /// Time between the bytes of an answer.
+    pub(super) gap_us: u64,
     pub(super) turnaround_us: u64,
+    /// An answer waits for this byte of the computer.
+    pub(super) trigger: Option<u8>,
+    /// The computer's echo of an answer ends with this byte.
+    pub(super) echo_end: Option<u8>,
     pub(super) initiator: Option<u8>,
     pub(super) terminators: Vec<u8>,
     error: u8,
@@ -69,9 +80,13 @@ impl Default for Control {
             hardwire: true,
             block: 80,
             enquiry: 0,
+            block_mode: false,
             xon: None,
-            xoff: None,
+            stop: Vec::new(),
+            gap_us: 0,
             turnaround_us: 0,
+            trigger: None,
+            echo_end: None,
             initiator: None,
             terminators: vec![13],
             error: 0,
@@ -86,11 +101,11 @@ impl Control {
     pub(super) fn receive(&mut self, byte: u8) -> Received {
         match std::mem::take(&mut self.parsing) {
             _ if byte == ESC => self.parsing = Parsing::Escape,
-            Parsing::Text if self.is_off => {}
+            Parsing::Text if self.is_off => return Received::Passed(byte),
             Parsing::Text if byte == ENQ => return Received::Enquiry,
             Parsing::Escape if byte == b'.' => self.parsing = Parsing::Dot,
             // Not device control: the text of HP-GL, without the ESC.
-            Parsing::Escape if self.is_off => {}
+            Parsing::Escape if self.is_off => return Received::Passed(byte),
             Parsing::Text | Parsing::Escape => return Received::Text(byte),
             Parsing::Dot => return self.letter(byte),
             Parsing::Parameters(letter, text) if byte == b':' => self.parameters(letter, &text),
@@ -138,26 +153,36 @@ impl Control {
         }
         match letter {
             // The size of the buffer is cut to what there is.
-            b'@' => self.hardwire = value(1).unwrap_or(1) & 1 != 0,
+            b'@' => {
+                let bits = value(1).unwrap_or(1);
+                (self.hardwire, self.block_mode) = (bits & 1 != 0, bits & 16 != 0);
+            }
             b'H' | b'I' => {
                 self.block = value(0).unwrap_or(80) as usize;
                 self.enquiry = byte(1).unwrap_or(0);
                 self.xon = byte(2).filter(|_| letter == b'I' && self.enquiry == 0);
             }
             b'M' => {
-                // 1.1875 p modulo 65536, in units of 1/1.2 ms.
-                let p = f64::from(value(0).unwrap_or(0));
-                self.turnaround_us = ((1.1875 * p) % 65_536.0 / 1.2 * 1000.0) as u64;
+                self.turnaround_us = delay_us(value(0).unwrap_or(0));
+                (self.trigger, self.echo_end) = (byte(1), byte(2));
                 self.terminators = [byte(3).or(Some(13)), byte(4)].into_iter().flatten().collect();
                 self.initiator = byte(5);
             }
-            _ => self.xoff = byte(1),
+            _ => {
+                self.gap_us = delay_us(value(0).unwrap_or(0));
+                self.stop = (1..=10).filter_map(byte).collect();
+            }
         }
     }
 
     /// XOFF and XON, if that is on.
-    pub(super) fn xon_xoff(&self) -> Option<(u8, u8)> {
-        Some((self.xoff?, self.xon?))
+    pub(super) fn xon_xoff(&self) -> Option<(Vec<u8>, u8)> {
+        Some((self.stop.clone(), self.xon?)).filter(|(stop, _)| !stop.is_empty())
+    }
+
+    /// What is answered at once to an enquiry that has to wait for room.
+    pub(super) fn immediate_answer(&self) -> &[u8] {
+        &self.stop
     }
 
     /// Whether an enquiry waits for room.
@@ -181,4 +206,9 @@ impl Control {
     pub(super) fn take_error(&mut self) -> u8 {
         std::mem::take(&mut self.error)
     }
+}
+
+/// The delay that a parameter stands for: 1.1875 p modulo 65536, in units of 1/1.2 ms (7475A's manual).
+fn delay_us(parameter: u32) -> u64 {
+    ((1.1875 * f64::from(parameter)) % 65_536.0 / 1.2 * 1000.0) as u64
 }

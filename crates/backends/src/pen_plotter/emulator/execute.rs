@@ -15,7 +15,7 @@ impl Step {
         Self { duration_us, answer: None }
     }
 
-    fn answering(answer: String) -> Self {
+    pub(super) fn answering(answer: String) -> Self {
         Self { duration_us: 0, answer: Some(answer) }
     }
 }
@@ -23,19 +23,19 @@ impl Step {
 /// A change of pens, microseconds: not measured anywhere; seconds on the real machine.
 const PEN_CHANGE_US: u64 = 2_000_000;
 /// The pen up or down, microseconds: an assumption.
-const PEN_MOVE_US: u64 = 50_000;
+pub(super) const PEN_MOVE_US: u64 = 50_000;
 /// A character of a label, microseconds: an assumption.
 const LETTER_US: u64 = 150_000;
 /// Pens that it holds.
 const STALLS: usize = 6;
 /// Plotter units in a centimetre, and 1 g in plotter units/s².
-const UNITS_A_CM: f64 = 400.0;
+pub(super) const UNITS_A_CM: f64 = 400.0;
 const G: f64 = 9.806_65 * 40_000.0;
 const MAX_SPEED_CM_S: f64 = 38.1;
-const TRAVEL_CM_S: f64 = 50.8;
+pub(super) const TRAVEL_CM_S: f64 = 50.8;
 
 /// Limits, P1 and P2 of A4 and A3.
-const PAPERS: [([f64; 2], [f64; 4]); 2] = [
+pub(super) const PAPERS: [([f64; 2], [f64; 4]); 2] = [
     ([11_040.0, 7721.0], [603.0, 521.0, 10_603.0, 7721.0]),
     ([16_158.0, 11_040.0], [170.0, 602.0, 15_370.0, 10_602.0]),
 ];
@@ -54,32 +54,32 @@ enum Parsing {
 #[derive(Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the machine")]
 pub(super) struct Interpreter {
-    plotter: &'static Plotter,
+    pub(super) plotter: &'static Plotter,
     parsing: Parsing,
-    number: String,
-    parameters: Vec<f64>,
+    pub(super) number: String,
+    pub(super) parameters: Vec<f64>,
     /// The instruction has executed pairs.
-    has_pairs: bool,
-    at: [f64; 2],
-    down: bool,
+    pub(super) has_pairs: bool,
+    pub(super) at: [f64; 2],
+    pub(super) down: bool,
     /// The pen has lifted by itself, until the next vector.
-    rests: bool,
+    pub(super) rests: bool,
     /// The pen in the holder, 0 for none, and whether each stall holds its pen.
-    pen: u16,
-    stalls: [bool; STALLS],
-    relative: bool,
-    scale: Option<[f64; 4]>,
-    large: bool,
-    turned: bool,
-    points: [f64; 4],
-    window: Option<[f64; 4]>,
-    speed: f64,
-    acceleration: f64,
-    terminator: u8,
-    error: u8,
-    initialized: bool,
-    points_changed: bool,
-    lever: bool,
+    pub(super) pen: u16,
+    pub(super) stalls: [bool; STALLS],
+    pub(super) relative: bool,
+    pub(super) scale: Option<[f64; 4]>,
+    pub(super) large: bool,
+    pub(super) turned: bool,
+    pub(super) points: [f64; 4],
+    pub(super) window: Option<[f64; 4]>,
+    pub(super) speed: f64,
+    pub(super) acceleration: f64,
+    pub(super) terminator: u8,
+    pub(super) error: u8,
+    pub(super) initialized: bool,
+    pub(super) points_changed: bool,
+    pub(super) lever: bool,
 }
 
 impl Interpreter {
@@ -296,146 +296,10 @@ impl Interpreter {
         self.instruction(name, &parameters, ink)
     }
 
-    /// The pen and the mode of an instruction of moves.
-    fn pen_state(&mut self, name: [u8; 2], ink: &mut Ink) -> u64 {
-        let before = self.down && !self.rests;
-        self.rests = false;
-        match &name {
-            b"PU" => self.down = false,
-            b"PD" => self.down = true,
-            b"PA" => self.relative = false,
-            _ => self.relative = true,
-        }
-        if self.down == before {
-            return 0;
-        }
-        if self.down {
-            self.touch(ink);
-        } else {
-            ink.pen(0, self.physical(self.at));
-        }
-        PEN_MOVE_US
-    }
-
-    /// The pen touches the paper where it is.
-    fn touch(&mut self, ink: &mut Ink) {
-        let at = self.physical(self.at);
-        if self.pen_is_down() && self.clip(at, at).is_some() {
-            ink.pen(self.pen, at);
-        }
-    }
-
-    fn fail(&mut self, number: u8) {
+    pub(super) fn fail(&mut self, number: u8) {
         if self.error == 0 {
             self.error = number;
         }
-    }
-
-    /// A coordinate pair in plotter units.
-    fn target(&mut self, pair: [f64; 2]) -> [f64; 2] {
-        if pair.iter().any(|value| value.abs() > 32_767.999_9) {
-            self.fail(6);
-        }
-        let pair = if self.scale.is_none() { pair.map(f64::floor) } else { pair };
-        let [sx, sy] = self.scale_factors();
-        if self.relative {
-            return [self.at[0] + pair[0] * sx, self.at[1] + pair[1] * sy];
-        }
-        match self.scale {
-            None => pair,
-            Some([x1, _, y1, _]) => {
-                [self.points[0] + (pair[0] - x1) * sx, self.points[1] + (pair[1] - y1) * sy].map(f64::round)
-            }
-        }
-    }
-
-    fn scale_factors(&self) -> [f64; 2] {
-        let [p1x, p1y, p2x, p2y] = self.points;
-        self.scale.map_or([1.0; 2], |[x1, x2, y1, y2]| [(p2x - p1x) / (x2 - x1), (p2y - p1y) / (y2 - y1)])
-    }
-
-    /// From the frame of `RO` to that of the ink.
-    fn physical(&self, at: [f64; 2]) -> [f64; 2] {
-        let ([width, _], _) = self.paper();
-        if self.turned { [width - at[1], at[0]] } else { at }
-    }
-
-    fn paper(&self) -> ([f64; 2], [f64; 4]) {
-        PAPERS[usize::from(self.large)]
-    }
-
-    /// The part of a segment within limits and window, in the frame of the ink.
-    fn clip(&self, from: [f64; 2], to: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
-        let ([width, height], _) = self.paper();
-        let mut area = [0.0, 0.0, width, height];
-        if let Some([x1, y1, x2, y2]) = self.window {
-            let (a, b) = (self.physical([x1, y1]), self.physical([x2, y2]));
-            area = [
-                area[0].max(a[0].min(b[0])),
-                area[1].max(a[1].min(b[1])),
-                area[2].min(a[0].max(b[0])),
-                area[3].min(a[1].max(b[1])),
-            ];
-        }
-        // Liang and Barsky: the range of the parameter within all four edges.
-        let (mut t0, mut t1) = (0.0_f64, 1.0_f64);
-        for axis in 0..2 {
-            let step = to[axis] - from[axis];
-            for (room, step) in [(from[axis] - area[axis], -step), (area[axis + 2] - from[axis], step)] {
-                if step == 0.0 && room < 0.0 {
-                    return None;
-                } else if step < 0.0 {
-                    t0 = t0.max(room / step);
-                } else if step > 0.0 {
-                    t1 = t1.min(room / step);
-                }
-            }
-        }
-        let at = |t: f64| [0, 1].map(|axis: usize| from[axis] + t * (to[axis] - from[axis]));
-        (t0 <= t1).then(|| (if t0 == 0.0 { from } else { at(t0) }, if t1 == 1.0 { to } else { at(t1) }))
-    }
-
-    /// Moves in a straight line; how long that takes.
-    fn go(&mut self, to: [f64; 2], ink: &mut Ink) -> u64 {
-        if self.lever {
-            self.fail(8);
-            return 0;
-        }
-        self.rests = false;
-        let (a, b) = (self.physical(self.at), self.physical(to));
-        if self.pen_is_down() {
-            match self.clip(a, b) {
-                None => ink.pen(0, a),
-                Some((from, until)) => {
-                    if from != a {
-                        ink.pen(0, a);
-                    }
-                    ink.pen(self.pen, from);
-                    ink.go(until);
-                    if until != b {
-                        ink.pen(0, until);
-                    }
-                }
-            }
-        }
-        let way = (to[0] - self.at[0]).abs().max((to[1] - self.at[1]).abs());
-        self.at = to;
-        let speed = if self.down { self.speed } else { TRAVEL_CM_S * UNITS_A_CM };
-        duration_us(way, speed, self.acceleration)
-    }
-
-    /// An arc about `center` through the pen's position, in chords.
-    fn arc(&mut self, center: [f64; 2], sweep: f64, chord: f64, ink: &mut Ink) -> u64 {
-        let from = self.at;
-        let count = (sweep.abs() / chord.clamp(0.36, 180.0)).ceil().max(1.0) as u32;
-        let mut us = 0;
-        for k in 1..=count {
-            let (sin, cos) = libm::sincos((sweep * f64::from(k) / f64::from(count)).to_radians());
-            let arm = [from[0] - center[0], from[1] - center[1]];
-            us += self
-                .go([center[0] + cos * arm[0] - sin * arm[1], center[1] + sin * arm[0] + cos * arm[1]], ink);
-        }
-        us
     }
 
     fn instruction(&mut self, name: [u8; 2], parameters: &[f64], ink: &mut Ink) -> Step {
@@ -501,54 +365,6 @@ impl Interpreter {
         (self.speed, self.acceleration) = (MAX_SPEED_CM_S * UNITS_A_CM, 2.0 * G);
     }
 
-    fn default_points(&self) -> [f64; 4] {
-        match (self.turned, self.large) {
-            (false, _) => self.paper().1,
-            (true, false) => [0.0, 610.0, 7200.0, 10_610.0],
-            (true, true) => [607.0, 797.0, 10_607.0, 15_997.0],
-        }
-    }
-
-    /// `RO`: the pen stays where it is.
-    fn turn(&mut self, turned: bool) {
-        let [x, y] = self.physical(self.at);
-        let ([width, _], _) = self.paper();
-        self.turned = turned;
-        self.at = if turned { [y, width - x] } else { [x, y] };
-    }
-
-    fn circle(&mut self, radius: f64, rest: &[f64], ink: &mut Ink) -> u64 {
-        let (center, was_down) = (self.at, self.down);
-        let [scale, _] = self.scale_factors();
-        let chord = rest.first().copied().unwrap_or(5.0).abs();
-        self.down = false;
-        ink.pen(0, self.physical(center));
-        let mut us = self.go([center[0] + radius * scale, center[1]], ink);
-        self.down = true;
-        self.touch(ink);
-        us += self.arc(center, 360.0, chord, ink);
-        self.lift(ink);
-        us += self.go(center, ink);
-        self.down = was_down;
-        self.touch(ink);
-        us + 2 * PEN_MOVE_US
-    }
-
-    fn rectangle(&mut self, relative: bool, corner: [f64; 2], ink: &mut Ink) -> u64 {
-        let (from, was_down) = (self.at, self.down);
-        let mode = std::mem::replace(&mut self.relative, relative);
-        let to = self.target(corner);
-        self.relative = mode;
-        self.down = true;
-        self.touch(ink);
-        let corners = [[to[0], from[1]], to, [from[0], to[1]], from];
-        let us = corners.into_iter().map(|corner| self.go(corner, ink)).sum::<u64>();
-        if !was_down {
-            self.lift(ink);
-        }
-        us + 2 * PEN_MOVE_US
-    }
-
     /// `SP`: a number that no stall has is ignored; of an empty stall another pen is taken, without an error.
     fn select(&mut self, number: f64, ink: &mut Ink) -> u64 {
         if number == f64::from(self.pen) || !(0.0..=STALLS as f64).contains(&number) {
@@ -574,68 +390,4 @@ impl Interpreter {
             self.pen = 0;
         }
     }
-
-    /// The position in user units.
-    fn user(&self) -> [f64; 2] {
-        let [sx, sy] = self.scale_factors();
-        let [x1, _, y1, _] = self.scale.unwrap_or_default();
-        [x1 + (self.at[0] - self.points[0]) / sx, y1 + (self.at[1] - self.points[1]) / sy]
-    }
-
-    /// The answer of `O` and this letter.
-    fn output(&mut self, letter: u8) -> Step {
-        let rounded = |values: &[f64]| {
-            let texts: Vec<String> = values.iter().map(|value| format!("{:.0}", value + 0.0)).collect();
-            texts.join(",")
-        };
-        let [x, y] = self.at;
-        let down = f64::from(u8::from(self.down));
-        Step::answering(match letter {
-            b'C' if self.scale.is_some() => {
-                let [x, y] = self.user();
-                format!("{x:.4},{y:.4},{down}")
-            }
-            b'E' => std::mem::take(&mut self.error).to_string(),
-            b'F' => "40,40".to_owned(),
-            b'H' => {
-                let ([width, height], _) = self.paper();
-                if self.turned {
-                    rounded(&[0.0, 0.0, height, width])
-                } else {
-                    rounded(&[0.0, 0.0, width, height])
-                }
-            }
-            b'I' => "7475A".to_owned(),
-            b'O' => "0,1,0,0,1,0,0,0".to_owned(),
-            b'P' => {
-                self.points_changed = false;
-                rounded(&self.points)
-            }
-            b'S' => {
-                let bits = [
-                    (1, self.down),
-                    (2, self.points_changed),
-                    (8, std::mem::take(&mut self.initialized)),
-                    (16, !self.lever),
-                    (32, self.error != 0),
-                ];
-                bits.iter().map(|(bit, set)| if *set { *bit } else { 0 }).sum::<u32>().to_string()
-            }
-            b'W' => {
-                let ([width, height], _) = self.paper();
-                rounded(&self.window.unwrap_or([0.0, 0.0, width, height]))
-            }
-            _ => rounded(&[x, y, down]),
-        })
-    }
-}
-
-/// From rest to rest: `d / v + v / a`, or `2 sqrt(d / a)`.
-fn duration_us(way: f64, speed: f64, acceleration: f64) -> u64 {
-    let seconds = if way * acceleration >= speed * speed {
-        way / speed + speed / acceleration
-    } else {
-        2.0 * (way / acceleration).sqrt()
-    };
-    (seconds * 1e6) as u64
 }

@@ -3,8 +3,10 @@
 //! The receiver picks device control out of the bytes as they come, the rest goes into the buffer. The
 //! interpreter takes bytes out only as it executes them: one vector is in execution at a time.
 
+mod answers;
 mod control;
 mod execute;
+mod motion;
 
 use std::collections::VecDeque;
 
@@ -37,6 +39,16 @@ pub(crate) struct Emulator {
     busy_us: u64,
     /// The answer that waits for the turnaround delay: when it is sent.
     outbox: VecDeque<(u64, Vec<u8>)>,
+    /// Answers that wait for the trigger.
+    untriggered: VecDeque<Vec<u8>>,
+    /// Bytes are dropped up to this one: the computer's echo of an answer.
+    echo: Option<u8>,
+    /// The block of block mode that has not ended.
+    block: Vec<u8>,
+    /// Bytes passed on to the terminal while the plotter is off.
+    passed: Vec<u8>,
+    /// The next byte has a framing or parity error.
+    is_damaged: bool,
     /// XOFF was sent.
     is_off: bool,
     /// When the pen went down or last moved.
@@ -53,6 +65,11 @@ impl Emulator {
             interpreter: Interpreter::new(Plotter::named("hp7475a").unwrap_or(Plotter::generic())),
             busy_us: 0,
             outbox: VecDeque::new(),
+            untriggered: VecDeque::new(),
+            echo: None,
+            block: Vec::new(),
+            passed: Vec::new(),
+            is_damaged: false,
             is_off: false,
             moved_us: 0,
             view: false,
@@ -61,16 +78,28 @@ impl Emulator {
 
     /// A byte has arrived.
     fn arrive(&mut self, byte: u8, now_us: u64) {
-        match self.control.receive(byte & 0x7F) {
-            Received::Text(byte) => {
-                if self.port.room() == 0 {
-                    // New bytes are dropped.
-                    self.control.overflow();
-                }
-                self.port.push(byte);
+        let mut byte = byte & 0x7F;
+        if std::mem::take(&mut self.is_damaged) {
+            // The byte is used as it was understood.
+            self.control.error(15);
+            byte ^= 0x01;
+        }
+        if let Some(end) = self.echo {
+            if byte == end {
+                self.echo = None;
             }
+            return;
+        }
+        if self.control.trigger == Some(byte)
+            && let Some(answer) = self.untriggered.pop_front()
+        {
+            return self.post(answer, now_us + self.control.turnaround_us);
+        }
+        match self.control.receive(byte) {
+            Received::Text(byte) => self.text(byte),
+            Received::Passed(byte) => self.passed.push(byte),
             Received::Nothing => {}
-            Received::Room => self.answer(&self.port.room().to_string(), now_us),
+            Received::Room => self.answer(&self.room_for_text().to_string(), now_us),
             Received::Size => self.control.wants_size = true,
             Received::Status => {
                 let status = self.status();
@@ -78,24 +107,71 @@ impl Emulator {
             }
             Received::LineError => {
                 let error = self.control.take_error();
+                self.end_block(error);
                 self.answer(&error.to_string(), now_us);
             }
-            Received::DropAnswers => self.outbox.clear(),
+            Received::DropAnswers => {
+                self.outbox.clear();
+                self.untriggered.clear();
+            }
             Received::DropBuffer => {
                 self.port.buffer.clear();
+                self.block.clear();
                 self.interpreter.forget();
                 self.control.wants_size = false;
             }
             Received::Enquiry => {
                 // Without a character for it the answer is sent at once, however full the buffer is.
-                if self.control.enquiry_is_honest() && self.port.room() < self.control.block {
+                if self.control.enquiry_is_honest() && self.room_for_text() < self.control.block {
                     self.control.owes_ack = true;
+                    let immediate = self.control.immediate_answer().to_vec();
+                    if !immediate.is_empty() {
+                        self.post(immediate, now_us);
+                    }
                 } else {
                     self.outbox.push_back((now_us, vec![0x06]));
                 }
             }
         }
         self.flow(now_us);
+    }
+
+    /// A byte of HP-GL, for the buffer, or for the block that has not ended.
+    fn text(&mut self, byte: u8) {
+        if self.room_for_text() == 0 {
+            // New bytes are dropped.
+            return self.control.overflow();
+        }
+        if self.control.block_mode {
+            self.block.push(byte);
+        } else {
+            self.port.push(byte);
+        }
+    }
+
+    /// Free bytes for HP-GL.
+    fn room_for_text(&self) -> usize {
+        self.port.room().saturating_sub(self.block.len())
+    }
+
+    /// The end of a block: without an error it goes into the buffer, else it is dropped.
+    fn end_block(&mut self, error: u8) {
+        for byte in std::mem::take(&mut self.block) {
+            if error == 0 {
+                self.port.push(byte);
+            }
+        }
+    }
+
+    /// Sends bytes, with the gap of `ESC.N` between them; an echo may follow.
+    fn post(&mut self, bytes: Vec<u8>, at_us: u64) {
+        self.echo = self.control.echo_end;
+        if self.control.gap_us == 0 {
+            return self.outbox.push_back((at_us, bytes));
+        }
+        for (index, byte) in (0..).zip(bytes) {
+            self.outbox.push_back((at_us + index * self.control.gap_us, vec![byte]));
+        }
     }
 
     /// `ESC.O`.
@@ -114,16 +190,20 @@ impl Emulator {
         let mut bytes = self.control.initiator.iter().copied().collect::<Vec<u8>>();
         bytes.extend_from_slice(text.as_bytes());
         bytes.extend_from_slice(&self.control.terminators);
-        self.outbox.push_back((now_us + self.control.turnaround_us, bytes));
+        if self.control.trigger.is_some() {
+            self.untriggered.push_back(bytes);
+        } else {
+            self.post(bytes, now_us + self.control.turnaround_us);
+        }
     }
 
     /// XOFF, XON and ACK as the buffer fills and empties.
     fn flow(&mut self, now_us: u64) {
-        let room = self.port.room();
+        let room = self.room_for_text();
         if let Some((xoff, xon)) = self.control.xon_xoff() {
             if !self.is_off && room <= self.control.block {
                 self.is_off = true;
-                self.outbox.push_back((now_us, vec![xoff]));
+                self.outbox.push_back((now_us, xoff));
             } else if self.is_off && room >= XON_BYTES.max(self.control.block + 1) {
                 self.is_off = false;
                 self.outbox.push_back((now_us, vec![xon]));

@@ -243,3 +243,89 @@ fn commanded_position_is_in_user_units() {
     assert_eq!(bench.ask("PU700,800;OC;"), "700,800,0\r");
     assert_eq!(bench.ask("IP0,0,1000,2000;SC0,10,0,10;PU5,2.5;OC;OA;"), "5.0000,2.5000,0\r500,500,0\r");
 }
+
+#[test]
+fn block_mode_releases_a_block_without_errors() {
+    let mut bench = Bench::new();
+    bench.send("\u{1b}.@;17:SP1;PU0,0;PD400,0;PU;");
+    bench.wait(10_000_000);
+    assert_eq!(bench.lines(), []);
+    assert_eq!(bench.ask("\u{1b}.E"), "0\r");
+    assert_eq!(bench.lines().len(), 1);
+    // A block with an error is thrown away, and may be sent again.
+    bench.send("PU0,400;PD400,400;PU;");
+    bench.wait(50_000);
+    bench.plotter.is_damaged = true;
+    bench.send("PU0,400;");
+    bench.wait(50_000);
+    assert_eq!(bench.ask("\u{1b}.E"), "15\r");
+    assert_eq!(bench.lines().len(), 1);
+    bench.send("PU0,400;PD400,400;PU;");
+    assert_eq!(bench.ask("\u{1b}.E"), "0\r");
+    assert_eq!(bench.lines().len(), 2);
+}
+
+#[test]
+fn plotter_that_is_off_passes_bytes_on() {
+    let mut bench = Bench::new();
+    bench.send("\u{1b}.)PD400,0;\u{1b}.(SP1;PU0,0;PD400,400;PU;");
+    bench.wait(10_000_000);
+    assert_eq!(bench.plotter.passed, b"PD400,0;");
+    assert_eq!(bench.lines().len(), 1);
+}
+
+#[test]
+fn answers_wait_for_trigger_and_swallow_their_echo() {
+    let mut bench = Bench::new();
+    // Trigger DC1, the echo ends with CR.
+    bench.send("\u{1b}.M;17;13;13:\u{1b}.B");
+    bench.wait(1_000_000);
+    assert_eq!(bench.heard(), "");
+    bench.send("\u{11}");
+    bench.wait(1_000_000);
+    assert_eq!(bench.heard(), "1024\r");
+    // The computer echoes the answer: none of it is HP-GL.
+    bench.send("1024\r\u{1b}.M:OE;");
+    bench.wait(1_000_000);
+    assert_eq!(bench.heard(), "0\r");
+}
+
+#[test]
+fn bytes_of_answers_have_a_gap() {
+    let mut bench = Bench::new();
+    // 1.1875 p / 1.2 ms: 100 ms for p = 101.
+    bench.send("\u{1b}.N101:");
+    bench.wait(100_000);
+    bench.send("\u{1b}.B");
+    bench.wait(4_000);
+    assert_eq!(bench.heard(), "1");
+    bench.wait(105_000);
+    assert_eq!(bench.heard(), "0");
+    bench.wait(400_000);
+    assert_eq!(bench.heard(), "24\r");
+}
+
+#[test]
+fn enquiry_that_waits_is_answered_at_once_with_the_text_of_esc_n() {
+    let mut bench = Bench::new();
+    bench.send("\u{1b}.I1000;5;6:\u{1b}.N;33:\u{1b}.@;0:");
+    bench.send(SLOW);
+    bench.wait(3_000_000);
+    bench.send(&"PD8000,10;".repeat(10));
+    bench.send("\u{5}");
+    bench.wait(500_000);
+    assert_eq!(bench.heard(), "!");
+    bench.wait(60_000_000);
+    assert_eq!(bench.heard(), "\u{6}");
+}
+
+#[test]
+fn framing_error_is_latched_and_the_byte_mangled() {
+    let mut bench = Bench::new();
+    bench.plotter.is_damaged = true;
+    bench.send("SP1;");
+    bench.wait(100_000);
+    assert_eq!(bench.ask("\u{1b}.E\u{1b}.E"), "15\r0\r");
+    // `RP` is no instruction of this plotter.
+    assert_eq!(bench.ask("OE;"), "1\r");
+}
