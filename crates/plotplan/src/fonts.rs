@@ -7,7 +7,8 @@ use anyhow::Context as _;
 use compiler::import::{FaceQuery, Fonts, OutlineFonts, OutlineGlyph};
 use drawing::{CubicBez, Line, Point, Segment};
 use fontdb::{Database, Family, Query, Stretch, Style, Weight};
-use ttf_parser::{Face, OutlineBuilder};
+use ttf_parser::gpos::{PairAdjustment, PositioningSubtable};
+use ttf_parser::{Face, GlyphId, OutlineBuilder, Tag};
 
 use crate::cli::{Reading, TextForm};
 use crate::failure::Failure;
@@ -99,6 +100,59 @@ impl OutlineFonts for Outlines {
         };
         self.database.with_face_data(self.find(query)?, draw)?
     }
+
+    fn kerning(&self, query: FaceQuery<'_>, pair: [char; 2]) -> f64 {
+        let of_face = |data: &[u8], index: u32| {
+            let face = Face::parse(data, index).ok()?;
+            let [left, right] = [face.glyph_index(pair[0])?, face.glyph_index(pair[1])?];
+            let units = by_positioning(&face, left, right).or_else(|| by_kern_table(&face, left, right))?;
+            Some(f64::from(units) / f64::from(face.units_per_em()))
+        };
+        let font = self.find(query).and_then(|font| self.database.with_face_data(font, of_face));
+        font.flatten().unwrap_or(0.0)
+    }
+}
+
+/// The kerning of a pair by the `GPOS` table, font units; `None` without a `kern` feature. As in layout,
+/// the first subtable of a lookup that covers the left glyph decides.
+fn by_positioning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> Option<i16> {
+    let table = face.tables().gpos?;
+    let mut lookups = Vec::new();
+    for feature in table.features.into_iter().filter(|feature| feature.tag == Tag::from_bytes(b"kern")) {
+        lookups.extend(feature.lookup_indices);
+    }
+    lookups.sort_unstable();
+    lookups.dedup();
+    if lookups.is_empty() {
+        return None;
+    }
+    let mut sum = 0;
+    for lookup in lookups.into_iter().filter_map(|index| table.lookups.get(index)) {
+        let pairs =
+            lookup.subtables.into_iter::<PositioningSubtable<'_>>().filter_map(|subtable| match subtable {
+                PositioningSubtable::Pair(pairs) => Some(pairs),
+                _ => None,
+            });
+        let of_pair = |pairs: PairAdjustment<'_>| {
+            let covered = pairs.coverage().get(left)?;
+            let (first, _) = match pairs {
+                PairAdjustment::Format1 { sets, .. } => sets.get(covered)?.get(right)?,
+                PairAdjustment::Format2 { classes, matrix, .. } => {
+                    matrix.get((classes.0.get(left), classes.1.get(right)))?
+                }
+            };
+            Some(first.x_advance)
+        };
+        sum += pairs.filter_map(of_pair).next().unwrap_or(0);
+    }
+    Some(sum)
+}
+
+/// The kerning of a pair by the `kern` table, font units.
+fn by_kern_table(face: &Face<'_>, left: GlyphId, right: GlyphId) -> Option<i16> {
+    let tables = face.tables().kern?.subtables.into_iter();
+    let horizontal = tables.filter(|table| table.horizontal && !table.variable && !table.has_cross_stream);
+    horizontal.filter_map(|table| table.glyphs_kerning(left, right)).reduce(|sum, next| sum + next)
 }
 
 /// Closed contours, in font sizes.

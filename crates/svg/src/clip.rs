@@ -15,10 +15,14 @@ const ON_EDGE_MM: f64 = 1e-7;
 const SHORTEST_MM: f64 = 1e-9;
 
 /// A region: inside any of its areas and inside all of `within`.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Region {
-    pub(crate) areas: Vec<Area>,
-    pub(crate) within: Option<Rc<Region>>,
+    areas: Vec<Area>,
+    within: Option<Rc<Region>>,
+    /// Lowest and highest y of all areas.
+    heights: (f64, f64),
+    /// Areas by bands of y, so that few of many are looked at.
+    bands: Vec<Vec<u32>>,
 }
 
 /// The inside of closed outlines, clipped itself where `within` is given.
@@ -40,6 +44,9 @@ struct Edge {
     from_y: f64,
     to_y: f64,
 }
+
+/// Bands of a region, at most.
+const MOST_BANDS: usize = 1024;
 
 impl Area {
     /// The inside of subpaths (mm), each closed by a line if it is open; `None` if they have no
@@ -133,18 +140,54 @@ impl Edge {
 }
 
 impl Region {
+    pub(crate) fn new(areas: Vec<Area>, within: Option<Rc<Self>>) -> Self {
+        let low = areas.iter().map(|area| area.bounds.y0).fold(f64::INFINITY, f64::min);
+        let high = areas.iter().map(|area| area.bounds.y1).fold(f64::NEG_INFINITY, f64::max);
+        let bands = vec![Vec::new(); areas.len().clamp(1, MOST_BANDS)];
+        let mut region = Self { areas, within, heights: (low, high), bands };
+        for (index, area) in region.areas.iter().enumerate() {
+            let [first, last] = [area.bounds.y0, area.bounds.y1].map(|y| region.band(y));
+            for band in &mut region.bands[first..=last] {
+                band.push(index as u32);
+            }
+        }
+        region
+    }
+
+    /// The band of a height; the nearest one for heights beyond all areas.
+    fn band(&self, y: f64) -> usize {
+        let count = self.bands.len() as f64;
+        let share = (y - self.heights.0) / (self.heights.1 - self.heights.0).max(1e-12);
+        (share * count).clamp(0.0, count - 1.0) as usize
+    }
+
     fn contains(&self, p: Point, work: &mut u64) -> bool {
-        self.within.as_ref().is_none_or(|region| region.contains(p, work))
-            && self.areas.iter().any(|area| {
-                area.contains(p, work) && area.within.as_ref().is_none_or(|region| region.contains(p, work))
-            })
+        if self.within.as_ref().is_some_and(|region| !region.contains(p, work)) {
+            return false;
+        }
+        self.bands[self.band(p.y)].iter().any(|&index| {
+            *work = work.saturating_sub(1);
+            let area = &self.areas[index as usize];
+            *work > 0
+                && area.contains(p, work)
+                && area.within.as_ref().is_none_or(|region| region.contains(p, work))
+        })
     }
 
     /// All crossings of a piece with the region's outlines.
     fn crossings(&self, piece: &Segment, bounds: Rect, cuts: &mut Vec<f64>, work: &mut u64) {
-        for area in &self.areas {
-            let reach = bounds.inflate(ON_EDGE_MM, ON_EDGE_MM);
-            if !overlap(reach, area.bounds) {
+        let reach = bounds.inflate(ON_EDGE_MM, ON_EDGE_MM);
+        let range = self.band(reach.y0)..=self.band(reach.y1);
+        let visited = self.bands.get(range.clone()).unwrap_or_default().iter().enumerate();
+        for (band, index) in visited.flat_map(|(band, all)| all.iter().map(move |&index| (band, index))) {
+            let area = &self.areas[index as usize];
+            *work = work.saturating_sub(1);
+            if *work == 0 {
+                return;
+            }
+            // An area is looked at in the first of its bands.
+            let is_first = self.band(area.bounds.y0).max(*range.start()) == range.start() + band;
+            if !is_first || !overlap(reach, area.bounds) {
                 continue;
             }
             let bands = &area.bands[area.bands_of(bounds.y0, bounds.y1)];

@@ -128,6 +128,11 @@ pub trait OutlineFonts: Debug {
     fn family(&self, query: FaceQuery<'_>) -> Option<String>;
     /// The glyph of a character; `None` if the face lacks it.
     fn glyph(&self, query: FaceQuery<'_>, character: char) -> Option<OutlineGlyph>;
+    /// What is added to the advance of a character before another one, in font sizes; 0 where the face
+    /// has no kerning for the pair.
+    fn kerning(&self, _query: FaceQuery<'_>, _pair: [char; 2]) -> f64 {
+        0.0
+    }
 }
 
 /// How a file is read.

@@ -84,6 +84,16 @@ fn advance(options: &Options<'_>, letter: &Letter<'_>) -> f64 {
     glyph(options, letter).map_or(MISSING_EM, |glyph| glyph.advance_em) * letter.style.font_size
 }
 
+/// What kerning adds to the advance of a letter before the next one, user units. Letters of two styles
+/// do not form a pair.
+fn kerning(options: &Options<'_>, letter: &Letter<'_>, next: Option<&Letter<'_>>) -> f64 {
+    let (Some(fonts), Some(next)) = (options.outlines, next) else { return 0.0 };
+    if !Rc::ptr_eq(&letter.style, &next.style) {
+        return 0.0;
+    }
+    fonts.kerning(face(&letter.style), [letter.character, next.character]) * letter.style.font_size
+}
+
 /// Reports the font that the stroke font stands for; false where there is no font at all.
 fn report_font<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, style: &Style<'a>) -> bool {
     let family = style.font_family.split(',').next().unwrap_or("").trim().trim_matches(['"', '\'']);
@@ -219,11 +229,12 @@ fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
         at = Point::new(first.place[0].unwrap_or(at.x), first.place[1].unwrap_or(at.y));
         let origin = at;
         let mut places = Vec::with_capacity(chunk.len());
-        for letter in chunk {
+        for (index, letter) in chunk.iter().enumerate() {
             at += (letter.shift[0], letter.shift[1]);
             places.push(at);
             let blank = if letter.character == ' ' { letter.style.word_spacing } else { 0.0 };
-            at.x += advance(walker.options, letter) + letter.style.letter_spacing + blank;
+            let kerning = kerning(walker.options, letter, chunk.get(index + 1));
+            at.x += advance(walker.options, letter) + kerning + letter.style.letter_spacing + blank;
         }
         let back = first.style.anchor.share() * (at.x - origin.x);
         for (letter, place) in chunk.iter().zip(places) {

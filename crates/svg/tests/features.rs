@@ -449,6 +449,27 @@ impl OutlineFonts for Squares {
             contours: if character == ' ' { Vec::new() } else { vec![square] },
         })
     }
+
+    fn kerning(&self, _query: FaceQuery<'_>, pair: [char; 2]) -> f64 {
+        if pair == ['A', 'V'] { -0.25 } else { 0.0 }
+    }
+}
+
+#[test]
+fn kerning_moves_the_next_letter_of_the_same_style() {
+    let starts = |content: &str| -> Vec<f64> {
+        let options = Options { outlines: Some(&Squares), ..Options::default() };
+        let document = svg::read(page(content).as_bytes(), &options);
+        document.drawing.strokes.iter().map(|stroke| stroke.bounding_box().x0).collect()
+    };
+    let text = |inner: &str| {
+        format!("<text x='10' y='50' font-size='20' fill='#00f' font-family='Known'>{inner}</text>")
+    };
+    assert_eq!(starts(&text("AVA")), [10.0, 25.0, 45.0]);
+    assert_eq!(starts(&text("VAA")), [10.0, 30.0, 50.0]);
+    // Not across styles, and not before a letter with a place of its own.
+    assert_eq!(starts(&text("A<tspan font-weight='bold'>V</tspan>")), [10.0, 30.0]);
+    assert_eq!(starts(&text("A<tspan x='40'>V</tspan>")), [10.0, 40.0]);
 }
 
 #[test]
@@ -560,4 +581,37 @@ fn malformed_xml_has_a_place() {
     let document = svg::read(b"<svg xmlns='http://www.w3.org/2000/svg'>\n <g></svg>", &Options::default());
     let found = &document.diagnostics[0];
     assert_eq!((found.code.name(), found.line), ("S0101", 2));
+}
+
+#[test]
+fn clip_path_of_many_shapes() {
+    // 400 squares of 3 mm, 5 mm apart. Lines through their middles keep 3 mm of every 5; those between
+    // rows nothing.
+    let squares =
+        (0..400).map(|k| format!("<rect x='{}' y='{}' width='3' height='3'/>", k % 20 * 5, k / 20 * 5));
+    let clip = format!("<clipPath id='c'>{}</clipPath>", squares.collect::<String>());
+    let clipped = |d: &str| -> f64 {
+        let content = format!("{clip}<path clip-path='url(#c)' d='{d}'/>");
+        strokes(&content).iter().map(Stroke::length).sum()
+    };
+    for y in [1.5, 51.5, 96.5] {
+        assert!((clipped(&format!("M0 {y}H100")) - 60.0).abs() < 1e-6, "{y}");
+        assert!((clipped(&format!("M{y} 0V100")) - 60.0).abs() < 1e-6, "{y}");
+        assert!(clipped(&format!("M0 {}H100", y + 2.5)).abs() < 1e-6, "{y}");
+    }
+    let diagonal = 2.0_f64.sqrt() * 60.0;
+    assert!((clipped("M0 0L100 100") - diagonal).abs() < 1e-6);
+    // A circle that no square holds whole: as from every square alone.
+    let alone: f64 = (0..400)
+        .map(|k| {
+            let square = format!("<rect x='{}' y='{}' width='3' height='3'/>", k % 20 * 5, k / 20 * 5);
+            let content = format!(
+                "<clipPath id='c'>{square}</clipPath><circle clip-path='url(#c)' cx='50' cy='50' r='33'/>"
+            );
+            strokes(&content).iter().map(Stroke::length).sum::<f64>()
+        })
+        .sum();
+    let content = format!("{clip}<circle clip-path='url(#c)' cx='50' cy='50' r='33'/>");
+    let together: f64 = strokes(&content).iter().map(Stroke::length).sum();
+    assert!((alone - together).abs() < 1e-6 && together > 50.0, "{alone} {together}");
 }

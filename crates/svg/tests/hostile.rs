@@ -113,3 +113,30 @@ fn coordinates_beyond_all_paper_are_reported() {
     );
     assert_eq!(codes(&text), ["S0217"]);
 }
+
+#[test]
+fn clip_path_of_thousands_of_shapes_ends() {
+    // Every line crosses hundreds of squares: the work is bounded, and the file is refused.
+    let squares: String = (0..20_000)
+        .map(|k| {
+            format!(
+                "<rect x='{}' y='{}' width='.5' height='.5'/>",
+                f64::from(k % 141) * 0.7,
+                f64::from(k / 141) * 0.7
+            )
+        })
+        .collect();
+    let points: String = (0..4000)
+        .map(|k| format!("{} {} ", f64::from(k * 7919 % 1000) / 10.0, f64::from(k * 2503 % 997) / 10.0))
+        .collect();
+    let text = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 100 100'><clipPath id='c'>{squares}</clipPath>\
+         <path clip-path='url(#c)' stroke='black' fill='none' d='M{points}'/></svg>"
+    );
+    let document = svg::read(text.as_bytes(), &svg::Options::default());
+    assert!(
+        document.diagnostics.iter().any(|found| found.code.name() == "S0103"),
+        "{:?}",
+        document.diagnostics
+    );
+}

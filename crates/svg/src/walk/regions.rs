@@ -70,7 +70,7 @@ impl<'a> Walker<'a, '_> {
         let corners = corners.map(|corner| scope.map * Point::from(corner));
         let subpath = Subpath::polyline(&corners, true);
         let area = subpath.and_then(|subpath| Area::new(&[subpath], drawing::FillRule::NonZero));
-        let region = Region { areas: area.into_iter().collect(), within: None };
+        let region = Region::new(area.into_iter().collect(), None);
         Rc::make_mut(&mut scope.clips).push(Rc::new(region));
     }
 
@@ -111,11 +111,11 @@ impl<'a> Walker<'a, '_> {
         inner.map = map;
         inner.style = self.style_by_ancestors(clip_path);
         self.transform(clip_path, &mut inner);
-        let mut region = Region::default();
+        let (mut areas, mut within) = (Vec::new(), None);
         if let Some(id) = inner.style.clip_path
             && let Some(other) = self.clip_path(clip_path, id, &inner)
         {
-            region.within = self.region(node, other, &inner, bounds);
+            within = self.region(node, other, &inner, bounds);
         }
         for child in clip_path.children().filter(Node::is_element) {
             if attributes::name(child) == Some("text") {
@@ -129,12 +129,12 @@ impl<'a> Walker<'a, '_> {
                 let outlines = self.text_outlines(child, &inner);
                 let edges = outlines.iter().map(|outline| outline.segments.len() as u64).sum();
                 self.output.clip_edges_left = self.output.clip_edges_left.saturating_sub(edges);
-                region.areas.extend(Area::new(&outlines, drawing::FillRule::NonZero));
+                areas.extend(Area::new(&outlines, drawing::FillRule::NonZero));
                 continue;
             }
-            region.areas.extend(self.area(child, &inner));
+            areas.extend(self.area(child, &inner));
         }
-        let region = Rc::new(region);
+        let region = Rc::new(Region::new(areas, within));
         if self.regions.len() < CACHE {
             self.regions.insert(key, Rc::clone(&region));
         }
