@@ -133,7 +133,7 @@ fn clip_path_of_thousands_of_shapes_ends() {
         "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 100 100'><clipPath id='c'>{squares}</clipPath>\
          <path clip-path='url(#c)' stroke='black' fill='none' d='M{points}'/></svg>"
     );
-    let document = svg::read(text.as_bytes(), &svg::Options::default());
+    let document = svg::read(text.as_bytes(), &Options::default());
     assert!(
         document.diagnostics.iter().any(|found| found.code.name() == "S0103"),
         "{:?}",

@@ -1,0 +1,160 @@
+//! Values of options as text: lengths, angles, places, pens.
+
+use compiler::layout::Crop;
+use compiler::{import, quantity};
+
+use super::PageChoice;
+
+pub(super) fn align(text: &str) -> Result<(f64, f64), String> {
+    let (mut x, mut y) = (0.5, 0.5);
+    for word in text.split('-') {
+        match word {
+            "left" => x = 0.0,
+            "right" => x = 1.0,
+            "bottom" => y = 0.0,
+            "top" => y = 1.0,
+            "center" | "centre" | "middle" => {}
+            _ => {
+                return Err("expected center, left, right, top, bottom or a corner such as top-left".into());
+            }
+        }
+    }
+    Ok((x, y))
+}
+
+pub(super) fn scale(text: &str) -> Result<f64, String> {
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    let factor = number.trim().parse::<f64>().ok().map(|factor| factor * unit);
+    factor
+        .filter(|factor| *factor > 0.0 && factor.is_finite())
+        .ok_or_else(|| "expected a positive factor such as 0.5, or a percentage such as 50%".to_owned())
+}
+
+/// The name of a file, a machine, a port or the like.
+pub(super) fn name() -> clap::builder::NonEmptyStringValueParser {
+    clap::builder::NonEmptyStringValueParser::new()
+}
+
+/// An angle in rad, at most a full turn; a bare number is in degrees.
+pub(super) fn angle(text: &str) -> Result<f64, String> {
+    let degrees = text.trim().parse::<f64>().ok().filter(|degrees| degrees.is_finite());
+    let angle = match degrees {
+        Some(degrees) => degrees.to_radians(),
+        None => quantity::angle_rad(text).map_err(|_| {
+            "expected an angle in degrees such as 90, or with a unit such as 1.57rad".to_owned()
+        })?,
+    };
+    if angle.abs() > std::f64::consts::TAU + 1e-9 {
+        return Err("expected an angle of at most a full turn: -360 to 360 degrees".to_owned());
+    }
+    Ok(angle)
+}
+
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    quantity::length_mm(text, true).map_err(|error| error.to_string())
+}
+
+/// Spacing of a hatch, and its angle after a comma.
+pub(super) fn hatch(text: &str) -> Result<import::Hatch, String> {
+    let (spacing, direction) = text.split_once(',').unwrap_or((text, "0"));
+    let spacing_mm = length(spacing)?;
+    if !(1e-3..1e4).contains(&spacing_mm) {
+        return Err("the spacing must be between 0.001 mm and 10 m".into());
+    }
+    Ok(import::Hatch { spacing_mm, angle_rad: angle(direction)? })
+}
+
+pub(super) fn page(text: &str) -> Result<PageChoice, String> {
+    match text {
+        "all" => Ok(PageChoice::All),
+        number => number
+            .parse()
+            .map(PageChoice::Number)
+            .map_err(|_| "expected the number of a page, or `all`".to_owned()),
+    }
+}
+
+pub(super) fn pen(text: &str) -> Result<u16, String> {
+    let pen = text.trim().parse::<u16>().ok();
+    pen.ok_or_else(|| "expected numbers of pens with commas between, such as 2,1".to_owned())
+}
+
+pub(super) fn pen_pair(text: &str) -> Result<(u16, u16), String> {
+    let what = "expected pairs of pens such as 2=1,4=2";
+    let (from, to) = text.split_once('=').ok_or(what)?;
+    let pen = |text: &str| text.trim().parse::<u16>().ok().filter(|pen| *pen > 0).ok_or(what);
+    Ok((pen(from)?, pen(to)?))
+}
+
+pub(super) fn grid(text: &str) -> Result<(u16, u16), String> {
+    let what = "expected columns and rows such as 3x2, from 1 to 1000";
+    let (columns, rows) = text.split_once('x').ok_or(what)?;
+    let count = |text: &str| text.trim().parse::<u16>().ok().filter(|n| (1..=1000).contains(n)).ok_or(what);
+    Ok((count(columns)?, count(rows)?))
+}
+
+pub(super) fn crop(text: &str) -> Result<Crop, String> {
+    if text == "sheet" {
+        return Ok(Crop::Sheet);
+    }
+    let what = "expected `sheet`, or a window X,Y,WIDTH,HEIGHT such as 10mm,10mm,5cm,5cm";
+    let lengths: Vec<&str> = text.split(',').collect();
+    let [x, y, width, height] = lengths[..] else { return Err(what.to_owned()) };
+    let window = [length(x)?, length(y)?, length(width)?, length(height)?];
+    if !(window[2] > 0.0 && window[3] > 0.0) {
+        return Err("the width and height of the window must be positive".to_owned());
+    }
+    Ok(Crop::Window(window))
+}
+
+pub(super) fn ticks(text: &str) -> Result<f64, String> {
+    let ticks = text.trim().parse::<f64>().ok().filter(|ticks| ticks.abs() >= 1.0 && ticks.abs() <= 1e9);
+    ticks.ok_or_else(|| "expected a number of ticks from 1 to 1e9, such as 3200".to_owned())
+}
+
+pub(super) fn dpi(text: &str) -> Result<f64, String> {
+    let dpi = text.trim().parse::<f64>().ok().filter(|dpi| (1.0..=100_000.0).contains(dpi));
+    dpi.ok_or_else(|| format!("{text} is not a number from 1 to 100000"))
+}
+
+pub(super) fn positions(text: &str) -> Result<(f64, f64), String> {
+    let (up, down) =
+        text.split_once(',').ok_or("expected two numbers with a comma between, such as 40,90")?;
+    let number = |text: &str| {
+        let value = text.trim().parse::<f64>().ok().filter(|value| value.abs() <= 30_000.0);
+        value.ok_or_else(|| format!("{text} is not a number between -30000 and 30000"))
+    };
+    Ok((number(up)?, number(down)?))
+}
+
+#[cfg(unix)]
+pub(super) fn fault(text: &str) -> Result<backends::Fault, String> {
+    use backends::Fault;
+    let what = "a fault is KIND=N or KIND=N:TIME, such as lost-answer=5 or unplugged=2s:1s";
+    let (kind, value) = text.split_once('=').ok_or(what)?;
+    let (first, second) = value.split_once(':').map_or((value, None), |(a, b)| (a, Some(b)));
+    let number = |text: &str| text.parse::<u64>().map_err(|_| format!("{text} is not a whole number"));
+    let microseconds = |text: &str| Ok::<u64, String>((time(text)? * 1e6).round() as u64);
+    let lasting = || microseconds(second.ok_or(what)?);
+    Ok(match kind {
+        "lost-answer" => Fault::LostAnswer(number(first)?),
+        "late-answer" => Fault::LateAnswer(number(first)?, lasting()?),
+        "garbled-answer" => Fault::GarbledAnswer(number(first)?),
+        "garbled-byte" => Fault::GarbledByte(number(first)?),
+        "full-buffer" => Fault::FullBuffer(microseconds(first)?, lasting()?),
+        "unplugged" => Fault::Unplugged(microseconds(first)?, lasting()?),
+        "held" => Fault::Held(microseconds(first)?, lasting()?),
+        "power-cut" => Fault::PowerCut(microseconds(first)?),
+        _ => return Err(what.to_owned()),
+    })
+}
+
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    quantity::time_s(text).map_err(|error| error.to_string())
+}
+
+pub(super) fn place(text: &str) -> Result<(f64, f64), String> {
+    let (x, y) =
+        text.split_once(',').ok_or("a place is two lengths with a comma between, such as 10mm,2cm")?;
+    Ok((length(x)?, length(y)?))
+}
