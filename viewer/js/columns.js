@@ -35,8 +35,12 @@ export function values(bytes, start, { count, order }) {
       weight *= 128;
     }
     // Zigzag: 0, -1, 1, -2, 2, ...
-    const half = Math.floor(value / 2);
-    result[k] = value % 2 === 0 ? half : -half - 1;
+    if (value < 2 ** 31) {
+      result[k] = (value >> 1) ^ -(value & 1);
+    } else {
+      const half = Math.floor(value / 2);
+      result[k] = value % 2 === 0 ? half : -half - 1;
+    }
   }
   for (let pass = 0; pass < order; pass++) {
     for (let k = 1; k < count; k++) result[k] += result[k - 1];

@@ -83,14 +83,63 @@ export function pose(machine) {
 }
 
 /**
- * The pen at motor positions, without allocation: `out[at]` is x, `out[at + 1]` y; machine mm.
- * @param {Machine} machine
+ * The pen at motor positions, machine mm, without allocation: rows are many. Returns a function that
+ * writes x and y to `out`.
+ * @param {Machine} machine @returns {(a: number, b: number, out: Float64Array) => void}
  */
 export function pen(machine) {
+  const [[m00, m01], [m10, m11]] = machine.joints_per_tick;
+  const [o0, o1] = machine.offset_ticks;
+  // The pen is a sum of vectors along its chain of anchors.
+  let [x0, y0] = [0, 0];
+  /** @type {{length: Affine, angle: Affine, turns: boolean, cos: number, sin: number}[]} */
+  const links = [];
+  for (let index = machine.linkage.pen; ;) {
+    const anchor = machine.linkage.anchors[index];
+    if ("x" in anchor) {
+      [x0, y0] = [anchor.x, anchor.y];
+      break;
+    }
+    if ("centers" in anchor) return closed(machine);
+    const { length_mm: length, angle_rad: angle } = anchor;
+    const turns = angle[1] !== 0 || angle[2] !== 0;
+    links.push({ length, angle, turns, cos: Math.cos(angle[0]), sin: Math.sin(angle[0]) });
+    index = anchor.from;
+  }
+  const count = links.length;
+  return (a, b, out) => {
+    const [u, v] = [a - o0, b - o1];
+    const q0 = m00 * u + m01 * v;
+    const q1 = m10 * u + m11 * v;
+    let x = x0;
+    let y = y0;
+    for (let k = 0; k < count; k++) {
+      const link = links[k];
+      const length = affine(link.length, q0, q1);
+      if (link.turns) {
+        const angle = affine(link.angle, q0, q1);
+        x += length * Math.cos(angle);
+        y += length * Math.sin(angle);
+      } else {
+        x += length * link.cos;
+        y += length * link.sin;
+      }
+    }
+    out[0] = x;
+    out[1] = y;
+  };
+}
+
+/**
+ * The pen of a mechanism with a closed chain: from all of its points.
+ * @param {Machine} machine @returns {(a: number, b: number, out: Float64Array) => void}
+ */
+function closed(machine) {
   const at = pose(machine);
   const index = 2 * machine.linkage.pen;
-  return (/** @type {number} */ a, /** @type {number} */ b) => {
+  return (a, b, out) => {
     const points = at(a, b);
-    return [points[index], points[index + 1]];
+    out[0] = points[index];
+    out[1] = points[index + 1];
   };
 }

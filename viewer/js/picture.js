@@ -7,8 +7,8 @@ import { theme } from "./colors.js";
 
 /** Ink is as wide as a common pen where the file states no width, mm. */
 const INK_MM = 0.3;
-/** Ink that is drawn in pieces gets this much of a frame, ms. */
-const SLICE_MS = 7;
+/** Ink that is drawn in pieces gets this much of a frame, ms: while playing, and else. */
+const SLICES_MS = { playing: 7, still: 30 };
 /** Below this scale, CSS pixels per mm, strokes are drawn from their corner points. */
 const COARSE_BELOW = 14;
 /** Corner points leave a stroke by at most this, mm. */
@@ -143,7 +143,7 @@ export class Picture {
   /**
    * Draws what a frame needs. Ink up to `row` and everything that moves; more ink than fits into a
    * frame follows in the next ones. Returns whether anything is left.
-   * @param {{row: number, motors: [number, number], predictedRow: number, predictedMotors: [number, number] | null}} now
+   * @param {{row: number, motors: [number, number], predictedRow: number, predictedMotors: [number, number] | null, isPlaying: boolean}} now
    */
   frame(now) {
     if (this.stale) {
@@ -153,7 +153,7 @@ export class Picture {
     const isBack = now.row < this.drawn.row || now.predictedRow < this.drawn.predicted;
     if (isBack) this.clearInk();
     this.target = { row: now.row, predicted: now.predictedRow };
-    const until = performance.now() + SLICE_MS;
+    const until = performance.now() + (now.isPlaying ? SLICES_MS.playing : SLICES_MS.still);
     this.drawAhead(until);
     this.drawInk(until);
     this.drawFront(now);

@@ -34,7 +34,7 @@ export function rowAt(times, t) {
 
 /**
  * @param {Float64Array} t @param {Float64Array} pens @param {[Float64Array, Float64Array]} q
- * @param {(a: number, b: number) => number[]} position  of the pen
+ * @param {(a: number, b: number, out: Float64Array) => void} position  of the pen
  * @param {boolean} inTicks  whether the machine moves in whole ticks
  * @returns {Track}
  */
@@ -45,13 +45,14 @@ export function track(t, pens, q, position, inTicks) {
   const pen = Uint16Array.from(pens);
   const first = [];
   const last = [];
+  const at = new Float64Array(2);
   for (let row = 0; row < count; row++) {
-    const [a, b] = inTicks
-      ? [Math.floor(q[0][row] + 0.5), Math.floor(q[1][row] + 0.5)]
-      : [q[0][row], q[1][row]];
-    const [px, py] = position(a, b);
-    x[row] = px;
-    y[row] = py;
+    const a = q[0][row];
+    const b = q[1][row];
+    if (inTicks) position(Math.floor(a + 0.5), Math.floor(b + 0.5), at);
+    else position(a, b, at);
+    x[row] = at[0];
+    y[row] = at[1];
     const before = row > 0 ? pen[row - 1] : 0;
     if (pen[row] !== before) {
       if (before !== 0) last.push(row);
@@ -111,7 +112,7 @@ export function motion(meta, rows) {
   }
   const inverse = 1 / (stride * period);
   // Rows are a period apart but for rests, at whose ends the motors do not move.
-  const q = rows.q;
+  const { q } = rows;
   const result = {
     speed: motors.map(() => new Float32Array(count)),
     acceleration: motors.map(() => new Float32Array(count)),
@@ -124,31 +125,57 @@ export function motion(meta, rows) {
   for (let end = 1; end <= count; end++) {
     const isRest = end === count || rows.t[end] - rows.t[end - 1] > 1.5 * period;
     if (!isRest) continue;
-    const at = (/** @type {number} */ row) => Math.min(Math.max(row, start), end - 1);
-    const half = stride >> 1;
-    for (let row = start; row < end; row++) {
-      for (let k = 0; k < motors.length; k++) {
-        const { speed, acceleration, jerk } = motors[k];
-        const [before, here, after] = [q[k][at(row - half - stride)], q[k][at(row - half)], q[k][at(row - half + stride)]];
-        const isLast = row === end - 1;
-        result.speed[k][row] = isLast ? 0 : ((after - here) * inverse) / speed;
-        result.acceleration[k][row] = isLast ? 0 : ((after - 2 * here + before) * inverse * inverse) / acceleration;
-        const jerks = result.jerk[k];
-        if (jerks && jerk && !isLast) {
-          const more = q[k][at(row - half - 2 * stride)];
-          jerks[row] = ((after - 3 * here + 3 * before - more) * inverse ** 3) / jerk;
-        }
-      }
-      if (row < end - 1) {
-        const [from, to] = [at(row - half), at(row - half + stride)];
-        const [x0, y0] = position(q[0][from], q[1][from]);
-        const [x1, y1] = position(q[0][to], q[1][to]);
-        result.pen[row] = Math.hypot(x1 - x0, y1 - y0) * inverse;
-      }
+    for (let k = 0; k < motors.length; k++) {
+      motorMotion(q[k], start, end, stride, inverse, motors[k], result.speed[k], result.acceleration[k], result.jerk[k]);
     }
+    penMotion(q, start, end, stride, inverse, position, result.pen);
     start = end;
   }
   return result;
+}
+
+/**
+ * One motor between two rests, rows `start` to before `end`.
+ * @param {Float64Array} q @param {number} start @param {number} end @param {number} stride @param {number} inverse
+ * @param {any} motor @param {Float32Array} speed @param {Float32Array} acceleration @param {Float32Array | null} jerk
+ */
+function motorMotion(q, start, end, stride, inverse, motor, speed, acceleration, jerk) {
+  const half = stride >> 1;
+  const last = end - 1;
+  const [perSpeed, perAcceleration] = [inverse / motor.speed, inverse ** 2 / motor.acceleration];
+  for (let row = start; row < last; row++) {
+    const here = q[Math.max(row - half, start)];
+    const after = q[Math.min(row - half + stride, last)];
+    const before = q[Math.max(row - half - stride, start)];
+    speed[row] = (after - here) * perSpeed;
+    acceleration[row] = (after - 2 * here + before) * perAcceleration;
+    if (jerk) {
+      const more = q[Math.max(row - half - 2 * stride, start)];
+      jerk[row] = ((after - 3 * here + 3 * before - more) * inverse ** 3) / motor.jerk;
+    }
+  }
+}
+
+/**
+ * The pen between two rests.
+ * @param {[Float64Array, Float64Array]} q @param {number} start @param {number} end @param {number} stride @param {number} inverse
+ * @param {(a: number, b: number, out: Float64Array) => void} position @param {Float32Array} pen
+ */
+function penMotion(q, start, end, stride, inverse, position, pen) {
+  const half = stride >> 1;
+  const last = end - 1;
+  const [one, two] = [new Float64Array(2), new Float64Array(2)];
+  let known = -1;
+  for (let row = start; row < last; row++) {
+    const from = Math.max(row - half, start);
+    const to = Math.min(row - half + stride, last);
+    // With neighbouring rows the last position is this one's first.
+    if (known === from) one.set(two);
+    else position(q[0][from], q[1][from], one);
+    position(q[0][to], q[1][to], two);
+    known = to;
+    pen[row] = Math.hypot(two[0] - one[0], two[1] - one[1]) * inverse;
+  }
 }
 
 /**

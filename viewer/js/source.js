@@ -76,9 +76,16 @@ export class Source {
     mark.textContent = cut(start, Math.max(end, start));
     const [before, after] = [cut(from, start), cut(end, to)];
     box.replaceChildren(from > offset ? `\u2026${before}` : before, mark, to < limit ? `${after}\u2026` : after);
-    this.shown = { from, cutBefore: from > offset, isUtf8: file.is_utf8 };
-    // Within its own box only: the page must not jump.
-    box.scrollTop = Math.max(mark.offsetTop - box.offsetTop - 60, 0);
+    this.shown = { from, cutBefore: from > offset, isUtf8: file.is_utf8, box, mark };
+    this.reveal();
+  }
+
+  /** Scrolls the box to the mark, once it is visible: the page itself must not jump. */
+  reveal() {
+    if (!this.shown) return;
+    const { box, mark } = this.shown;
+    const above = mark.getBoundingClientRect().top - box.getBoundingClientRect().top;
+    box.scrollTop = Math.max(box.scrollTop + above - 60, 0);
   }
 
   /** The byte of the text that was clicked in the box; null outside. @param {HTMLElement} box @param {MouseEvent} event */

@@ -161,6 +161,7 @@ export class Viewer {
       tab.setAttribute("tabindex", isOpen ? "0" : "-1");
       byId(tab.getAttribute("aria-controls") ?? "").hidden = !isOpen;
     }
+    this.source.reveal();
   }
 
   listenToPicture() {
@@ -490,6 +491,7 @@ export class Viewer {
       motors: motorsAt(this.rows, this.t),
       predictedRow: this.predicted ? rowAt(this.predicted.t, this.t) : 0,
       predictedMotors: this.predicted ? motorsAt(this.predicted, this.t) : null,
+      isPlaying: this.isPlaying,
     });
     this.scrubber.set(this.t);
     this.strips?.setHead(this.t, this.isPlaying);
@@ -497,6 +499,10 @@ export class Viewer {
     const strokes = this.rows.first.length;
     byId("clock").textContent = `${time(this.t)} of ${time(this.end)} \u00b7 stroke ${whole(stroke + 1)} of ${whole(strokes)}`;
     if (!this.isPlaying) this.scrubber.describe(`stroke ${stroke + 1} of ${strokes}, pen ${this.rows.pen[this.row] === 0 ? "up" : "down"}`);
+    if (!left && !this.isShown) {
+      this.isShown = true;
+      performance.mark("shown");
+    }
     if (this.isPlaying || left) this.draw();
   }
 }

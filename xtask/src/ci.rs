@@ -39,6 +39,7 @@ const STEPS: &[Step] = &[
         cargo("package --workspace --no-verify --locked --allow-dirty --quiet")
     }),
     step("corpus", "every drawing of ../shared/corpus, where it exists", corpus),
+    step("web-test", "animated previews in a browser; installs Node.js, npm packages and Chromium", web_test),
     step("fuzz", "one minute of fuzzing; installs nightly and cargo-fuzz if missing", fuzz),
     on_request("firmware", "the firmware on an emulated ATmega328P; installs Debian packages", firmware),
     on_request("verify-package", "every crate builds from its package", || {
@@ -187,6 +188,11 @@ fn corpus() -> Result<()> {
         return Ok(());
     }
     ensure!(crate::corpus::run(&folder)?, "see the drawings above");
+    Ok(())
+}
+
+fn web_test() -> Result<()> {
+    ensure!(crate::web_test::run(None, false)?, "see the tests above");
     Ok(())
 }
 

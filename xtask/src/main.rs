@@ -12,6 +12,7 @@ mod order;
 mod peers;
 mod svg_peers;
 mod tidy;
+mod web_test;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
@@ -26,6 +27,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
                 (skipped if it is not installed): length and distance
   usvg DIR      compare the SVG importer with usvg on every SVG file in DIR: length and distance
   order DIR     plan every drawing below DIR in file order and in optimized order, on two machines
+  web-test [PROGRAM] [--write]
+                test animated previews in a browser, written by PROGRAM or the release build; installs
+                Node.js, Chromium and npm packages if missing; --write makes new reference screenshots
   bench order GENERATOR
                 order the drawings of the script GENERATOR (python3 with numpy); compare with
                 reference solutions
@@ -49,6 +53,10 @@ fn main() -> ExitCode {
         ["firmware", ref filters @ ..] => firmware::run(filters),
         ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),
         ["usvg", folder] => svg_peers::run(folder.as_ref()),
+        ["web-test"] => web_test::run(None, false),
+        ["web-test", "--write"] => web_test::run(None, true),
+        ["web-test", program] => web_test::run(Some(program), false),
+        ["web-test", program, "--write"] => web_test::run(Some(program), true),
         ["order", folder] => order::real(folder.as_ref()),
         ["bench", "read"] => bench::read(None),
         ["bench", "read", generator] => bench::read(Some(generator.as_ref())),
