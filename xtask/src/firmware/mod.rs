@@ -3,6 +3,7 @@
 
 mod arduino;
 mod dc;
+mod micropython;
 mod rig;
 mod steppers;
 mod trace;
@@ -99,6 +100,7 @@ pub(crate) fn run(filters: &[&str]) -> Result<bool> {
     bench.check("Arduino examples compile", arduino::examples);
     steppers::run(&mut bench);
     dc::run(&mut bench);
+    bench.check("MicroPython: protocol, loop and zot on simulated motors", micropython::tests);
     println!("{} passed, {} failed", bench.passed, bench.failed);
     Ok(bench.failed == 0)
 }

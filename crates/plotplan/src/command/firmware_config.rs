@@ -1,4 +1,5 @@
-//! The machine header of the firmware (`firmware/src/plotplan_firmware.h`), from a machine file.
+//! The machine header of the firmware (`firmware/src/plotplan_firmware.h`), and the module `machine.py`
+//! of the firmware in MicroPython, from a machine file.
 
 use std::fmt::Write as _;
 
@@ -38,7 +39,7 @@ const SERVO: &str = "{1500, 256}";
 /// Error at which the motors stop, counts.
 const FOLLOW_COUNTS: u32 = 40;
 
-/// The header, C.
+/// The header, C, or the module, Python.
 pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Result<String, Failure> {
     let machine = &loaded.machine;
     let described = loaded.file.drive(machine).map_err(|error| Failure::Usage(error.into()))?;
@@ -65,6 +66,9 @@ pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Re
         )));
     }
     let ranges = ranges(machine)?;
+    if drive == FirmwareDrive::Micropython {
+        return Ok(module(machine, described.as_ref(), ranges));
+    }
     let mut text = format!(
         "/* Machine header of the plotplan firmware: plotplan machine show {name} --firmware-config {drive}\n   \
          Wiring and the values to adjust: docs/firmware.md */\n#include \"plotplan_firmware.h\"\n\n\
@@ -94,20 +98,63 @@ pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Re
     Ok(text)
 }
 
-/// The loop of a DC motor, in the firmware's units (`dc_control.h`). Speed, acceleration and friction are
-/// fed forward in full. Gains of a loop without feed-forward, as in report 1, are not taken: such a loop
-/// is tuned for another task.
-fn feedback(drive: Option<&Drive>, motor: usize) -> String {
-    let ([mut kp, mut ki], [mut g, mut tau, mut friction]) = (GAINS, MODEL);
+/// Pins of the board of report 1 (docs/references.md): driver and encoder of each motor.
+const PYTHON_PINS: [[&str; 2]; 2] = [
+    [r#"(3, "PA10", ("PB4", "PB5"))"#, r#"(8, ("PC6", "PC7"))"#],
+    [r#"(5, "PC1", ("PA0", "PA1"))"#, r#"(4, ("PB6", "PB7"))"#],
+];
+
+/// The module `machine.py`.
+fn module(machine: &Machine, drive: Option<&Drive>, ranges: [[i64; 2]; 2]) -> String {
+    let name = machine.name();
+    let home = machine.motor_positions(&machine.start());
+    let mut text = format!(
+        "\"\"\"Machine of plotplan's firmware in MicroPython: plotplan machine show {name} --firmware-config \
+         micropython\n\nWiring and the values to adjust: docs/firmware.md\n\"\"\"\n\n\
+         NAME = \"{name}\"  # a plan for another machine is refused\n\
+         PERIOD_US = 5_000  # of the loop\n\
+         HOME = ({:.0}, {:.0})  # ticks of the pose in which it is started\n\
+         MUST_HOME = False\nMOTORS = (\n",
+        home[0], home[1]
+    );
+    for (index, (motor, [lowest, highest])) in machine.motors().iter().zip(ranges).enumerate() {
+        let ([kp, ki], [g, tau, friction]) = gains(drive, index);
+        let [driver, encoder] = PYTHON_PINS[index];
+        let _ = write!(
+            text,
+            "    {{  # {}\n        \"driver\": {driver},\n        \"reversed\": False,\n        \
+             \"encoder\": {encoder},\n        \"encoder_reversed\": False,\n        \
+             \"ticks_s\": {:.0},\n        \"lowest\": {lowest},\n        \"highest\": {highest},\n        \
+             \"loop\": {{\"kp\": {kp}, \"ki\": {ki}, \"ticks_s_percent\": {g}, \"time_constant_s\": {tau}, \
+             \"friction\": {friction}}},\n    }},\n",
+            motor.name.replace(['\n', '\r'], " "),
+            (motor.max_speed_ticks_s * SPEED_MARGIN).ceil(),
+        );
+    }
+    text.push_str(")\nSERVO = (2, 1, \"PA5\")\nPEN_UP_US = 1000\nPEN_DOWN_US = 1500\n");
+    text
+}
+
+/// `[kp, ki]` (% per tick, % per tick and s) and `[speed per duty, time constant, friction]` of a motor.
+/// Gains of a loop without feed-forward, as in report 1, are not taken: such a loop is tuned for
+/// another task.
+fn gains(drive: Option<&Drive>, motor: usize) -> ([f64; 2], [f64; 3]) {
+    let (mut gains, mut model) = (GAINS, MODEL);
     if let Some(drive) = drive {
-        if let MotorPlant::Dc(model) = &drive.motors[motor].plant {
-            (g, tau, friction) =
-                (model.speed_per_duty_ticks_s, model.time_constant_s, model.friction_percent);
+        if let MotorPlant::Dc(plant) = &drive.motors[motor].plant {
+            model = [plant.speed_per_duty_ticks_s, plant.time_constant_s, plant.friction_percent];
         }
-        if let (Feedback::Pid(gains, _), true) = (&drive.feedback, drive.feed_forward.speed > 0.0) {
-            (kp, ki) = (gains.kp, gains.ki);
+        if let (Feedback::Pid(pid, _), true) = (&drive.feedback, drive.feed_forward.speed > 0.0) {
+            gains = [pid.kp, pid.ki];
         }
     }
+    (gains, model)
+}
+
+/// The loop of a DC motor, in the firmware's units (`dc_control.h`). Speed, acceleration and friction are
+/// fed forward in full.
+fn feedback(drive: Option<&Drive>, motor: usize) -> String {
+    let ([kp, ki], [g, tau, friction]) = gains(drive, motor);
     // Setpoints are in 1/64 tick; the window is 20 ms for the speed and twice 10 ms for the acceleration.
     let values = [
         kp * DUTY_PER_PERCENT * 256.0,
