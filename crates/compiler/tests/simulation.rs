@@ -195,3 +195,33 @@ fn impossible_values_of_the_drive_name_their_key() {
         assert!(error.contains(expected), "{to}: {error}");
     }
 }
+
+/// The coaxial preset with DC motors by their data sheet; `first` extends the table of motor 1, `arm`
+/// is the `[drive.arm]` table.
+fn data_sheet_drive(first: &str, arm: &str) -> Drive {
+    let motor = "[[drive.motor]]\nkind = \"dc\"\nsupply = \"12V\"\nresistance = \"5.5ohm\"\n\
+                 torque_constant = \"0.0105Nm/A\"\ninertia = \"5e-7kgm2\"\ngear = 50\n";
+    let (machine, _) = PRESETS[0].toml.split_once("[[drive.motor]]").expect("the preset has a drive");
+    let file =
+        MachineFile::parse(&format!("{machine}{arm}\n{motor}{first}\n{motor}")).expect("a machine file");
+    let machine = file.machine().expect("a machine");
+    file.drive(&machine).expect("a drive").expect("a drive table")
+}
+
+/// A mass at the elbow turns about the base with the first link only, so that motor 1 moves
+/// `m l1²` = 0.5 kg (0.206 m)² and motor 2 none of it: the same as an inertia on its output shaft.
+#[test]
+fn elbow_mass_of_a_machine_file_is_an_inertia_on_motor_1() {
+    let zot = Zot::new();
+    let bare = zot.simulate(&data_sheet_drive("", "")).unwrap();
+    let masses =
+        "[drive.arm]\nlink1 = { mass = \"1e-9kg\" }\nlink2 = { mass = \"1e-9kg\" }\nelbow_mass = \"0.5kg\"\n";
+    let arm = zot.simulate(&data_sheet_drive("", masses)).unwrap();
+    let lumped = zot.simulate(&data_sheet_drive("load_inertia = \"0.021218kgm2\"", "")).unwrap();
+    for (arm, lumped) in arm.outcome.motors.iter().zip(&lumped.outcome.motors) {
+        // The equations of the arm are integrated numerically, those of a single motor in closed form.
+        assert!((arm.error_rms_ticks / lumped.error_rms_ticks - 1.0).abs() < 0.005, "{arm:?} {lumped:?}");
+    }
+    let [with, without] = [&arm, &bare].map(|run| run.outcome.motors[0].error_rms_ticks);
+    assert!((with / without - 1.0).abs() > 0.05, "the mass has no effect: {with} {without}");
+}

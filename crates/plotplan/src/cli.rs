@@ -2,6 +2,7 @@
 
 mod device;
 mod format;
+mod project;
 mod reading;
 mod values;
 
@@ -14,6 +15,7 @@ use clap_complete::Shell;
 
 pub(crate) use device::{Emulate, Flow, PenLift, Send};
 pub(crate) use format::Format;
+pub(crate) use project::{Build, Diff, Init};
 pub(crate) use reading::{PageChoice, Reading, TextForm};
 use values::{align, angle, length, name, pen, place, scale, ticks, time};
 
@@ -63,10 +65,12 @@ pub(crate) enum Color {
 }
 
 impl Arguments {
-    /// With `--format hpgl`, `--plotter` is the plotter to write for.
+    /// Options that stand for others: with `--format hpgl`, `--plotter` is the plotter to write for.
     pub(crate) fn settle(&mut self) {
-        if let Command::Convert(convert) = &mut self.command {
-            convert.settle();
+        match &mut self.command {
+            Command::Convert(convert) => convert.settle(),
+            Command::Diff(diff) if diff.json => self.messages.report = ReportForm::Json,
+            _ => {}
         }
     }
 }
@@ -89,6 +93,12 @@ pub(crate) enum Command {
     Tune(Tune),
     /// Send a plan to a machine
     Send(Send),
+    /// Make the plans of a project, `plotplan.toml`, that are out of date
+    Build(Build),
+    /// Write a project file for a folder of drawings
+    Init(Init),
+    /// Compare two plans, drawings or machine files, in any mix
+    Diff(Diff),
     /// Emulate a controller on a pseudo-terminal
     #[cfg(unix)]
     #[command(alias = "device")]
@@ -459,6 +469,8 @@ pub(crate) enum FirmwareDrive {
     Dc,
     /// RC servos
     Servo,
+    /// DC motors with encoders, on a board with MicroPython: the module machine.py
+    Micropython,
 }
 
 impl std::fmt::Display for FirmwareDrive {
@@ -467,6 +479,7 @@ impl std::fmt::Display for FirmwareDrive {
             Self::Step => "step",
             Self::Dc => "dc",
             Self::Servo => "servo",
+            Self::Micropython => "micropython",
         })
     }
 }
@@ -555,6 +568,9 @@ impl Command {
             Self::Verify(_) => "verify",
             Self::Preview(_) => "preview",
             Self::Send(_) => "send",
+            Self::Build(_) => "build",
+            Self::Init(_) => "init",
+            Self::Diff(_) => "diff",
             #[cfg(unix)]
             Self::Emulate(_) => "emulate",
             Self::Machine(Machine::List) => "machine list",
@@ -573,7 +589,8 @@ impl Command {
 
 /// Whether standard output holds the report itself, so that its JSON form goes there.
 pub(crate) fn reports_on_stdout(command: &str) -> bool {
-    ["check", "info", "verify", "simulate", "tune", "machine check", "machine list"].contains(&command)
+    ["check", "info", "verify", "diff", "simulate", "tune", "machine check", "machine list"]
+        .contains(&command)
 }
 
 /// Options that choose files or the form of reports: the plan does not depend on them.

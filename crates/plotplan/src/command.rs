@@ -1,7 +1,9 @@
 //! The commands, one file each.
 
+mod build;
 mod check;
 mod convert;
+mod diff;
 #[cfg(unix)]
 mod emulate;
 mod firmware_config;
@@ -39,6 +41,9 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Simulate(simulate) => simulate::run(simulate),
         Command::Tune(tune) => tune::run(tune),
         Command::Send(send) => send::run(send),
+        Command::Build(build) => build::run(build),
+        Command::Init(init) => build::init(init),
+        Command::Diff(diff) => diff::run(diff),
         #[cfg(unix)]
         Command::Emulate(emulate) => emulate::run(emulate),
         Command::Machine(machine) => machine::run(machine),

@@ -342,6 +342,40 @@ impl Progress {
     }
 }
 
+/// Progress of several outputs; on a terminal only.
+pub(crate) struct Counter {
+    bar: ProgressBar,
+}
+
+impl Counter {
+    pub(crate) fn new(of: usize) -> Self {
+        let bar = if std::io::stderr().is_terminal() && !session::style().quiet && of > 0 {
+            let bar = ProgressBar::new(of as u64);
+            if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos} of {len}{left}") {
+                bar.set_style(style.with_key("left", time_left));
+            }
+            bar.enable_steady_tick(Duration::from_millis(500));
+            bar
+        } else {
+            ProgressBar::hidden()
+        };
+        Self { bar }
+    }
+
+    /// Prints without the bar in the way.
+    pub(crate) fn suspend(&self, print: impl FnOnce()) {
+        self.bar.suspend(print);
+    }
+
+    pub(crate) fn step(&self) {
+        self.bar.inc(1);
+    }
+
+    pub(crate) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
 /// The time left, once there is something to estimate it from.
 fn time_left(state: &ProgressState, text: &mut dyn std::fmt::Write) {
     let eta = state.eta();

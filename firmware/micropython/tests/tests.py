@@ -201,7 +201,7 @@ class Line:
 
     def read(self):
         now = pyb.WORLD.us
-        if now - self.last_us > 500_000 and not self.is_done():
+        if now - self.last_us > 100_000 and not self.is_done():
             self.next, self.last_us = self.acknowledged, now  # nothing came: again
         window = sum(len(line) + 1 for line in self.lines[self.acknowledged:self.next])
         while self.next < len(self.lines) and window + len(self.lines[self.next]) < self.ROOM:
@@ -230,7 +230,7 @@ class Line:
                 if number > self.acknowledged:
                     self.acknowledged = number
                     self.next = max(self.next, number)
-                elif number < self.next and pyb.WORLD.us - self.repeated_us > 100_000:
+                elif number < self.next and pyb.WORLD.us - self.repeated_us > 50_000:
                     # A line was lost; those behind it, which are still on their way, say the same.
                     self.next, self.repeated_us = number, pyb.WORLD.us
 

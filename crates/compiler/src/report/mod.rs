@@ -3,7 +3,9 @@
 //! Every command reports with the same type, [`Report`], on success and on failure. `docs/reports.md`
 //! and the JSON schema are generated from the types of this module; see [`page`].
 
+mod build;
 mod certificate;
+mod diff;
 mod input;
 mod machine;
 pub mod page;
@@ -17,9 +19,11 @@ pub mod tuning;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+pub use self::build::{BuiltOutput, BuiltState};
 pub use self::certificate::{
     CertificateReport, DeviationReport, Distances, JerkReport, MotorReport, TickFloor,
 };
+pub use self::diff::{CauseReport, DiffReport, QuantityReport, StrokesReport};
 pub use self::input::{
     DrawingReport, FactReport, MotorLimits, PageReport, PenReport, PlanReport, ProgramReport,
 };
@@ -82,6 +86,10 @@ pub struct Report {
     pub motor: Option<tuning::MotorEstimates>,
     /// What was sent, from `send`.
     pub sending: Option<SendReport>,
+    /// What changed, from `diff`.
+    pub diff: Option<DiffReport>,
+    /// The outputs of a project, from `build`.
+    pub built: Vec<BuiltOutput>,
 }
 
 /// A file that was written.
@@ -325,6 +333,8 @@ codes! {
     Verification "verification" 1 "The certificate does not hold."
     InkError "ink-error" 1 "Predicted ink strays or is missed by more than --within allows."
     Undetermined "undetermined" 1 "A record does not determine all parameters of a motor."
+    Differs "differs" 1 "Two files differ, and --exit-code was given."
+    Build "build" 1 "Outputs of a project could not be made, or are not what it makes."
     Strict "strict" 1 "There was a warning, and --strict was given."
     Drawing "drawing" 1 "The drawing or plan cannot be used for another reason, which the message states."
     Usage "usage" 2 "The command line is wrong."

@@ -42,6 +42,11 @@ impl Default for Format {
 }
 
 impl Format {
+    /// Whether files of this format hold a plan for one machine.
+    pub(crate) fn needs_machine(self) -> bool {
+        !matches!(self, Self::Hpgl | Self::Svg)
+    }
+
     pub(crate) fn name(self) -> &'static str {
         self.name_and_help().map_or("", |(name, _)| name)
     }

@@ -54,6 +54,16 @@ pub(super) fn length(text: &str) -> Result<f64, String> {
     quantity::length_mm(text, true).map_err(|error| error.to_string())
 }
 
+/// A positive length in mm.
+pub(super) fn distance(text: &str) -> Result<f64, String> {
+    length(text).and_then(|mm| if mm > 0.0 { Ok(mm) } else { Err("expected a positive length".into()) })
+}
+
+/// A number of processes.
+pub(super) fn jobs(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|jobs| (1..=1024).contains(jobs)).ok_or_else(|| "expected a number from 1".to_owned())
+}
+
 /// Spacing of a hatch, and its angle after a comma.
 pub(super) fn hatch(text: &str) -> Result<import::Hatch, String> {
     let (spacing, direction) = text.split_once(',').unwrap_or((text, "0"));
