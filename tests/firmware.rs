@@ -113,6 +113,7 @@ fn measure(machine: &Machine, drawing: &Drawing, ink: &Lines, scale: f64) -> Cer
         period_us: 1_000_000,
         rows: 0,
         lift_overlap_us: 0,
+        rounding: plan::Rounding::Path,
         pen_colors: BTreeMap::new(),
         duration_us: 0,
     };

@@ -70,6 +70,7 @@ fn header(rows: &[ExactRow], period_us: u64) -> Header {
         period_us,
         rows: rows.len() as u64,
         lift_overlap_us: 0,
+        rounding: plan::Rounding::Nearest,
         pen_colors: std::collections::BTreeMap::new(),
         duration_us: rows.last().map_or(0, |(row, _)| row.t_us),
     }

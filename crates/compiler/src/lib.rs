@@ -11,7 +11,7 @@
 //! use compiler::machine_file::{MachineFile, PRESETS};
 //! use compiler::pipeline::{Order, Request, compile};
 //! use compiler::{import, report};
-//! use planner::{PlacementOptions, TimingLaw};
+//! use planner::{PlacementOptions, Rounding, TimingLaw};
 //!
 //! let document = import::read(b"IN;SP1;PU400,400;PD1200,400,1200,1000;PU;", &import::Options::default())?;
 //! let machine = MachineFile::parse(PRESETS[1].toml)?.machine()?;
@@ -25,6 +25,7 @@
 //!     pen_colors: std::collections::BTreeMap::new(),
 //!     lift_overlap_s: 0.0,
 //!     timing_law: TimingLaw::TimeOptimal,
+//!     rounding: Rounding::Path,
 //!     allow_over_limit: false,
 //! };
 //! let compiled = compile(&document.pages[0].drawing, &machine, &request, &|_step| {})?;

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use drawing::{Affine, Drawing, Pen, Point, Rect, Vec2};
 use kinematics::{Fault, JointPos, Machine};
-use plan::{Header, Limits, Motor};
+use plan::{Header, Limits, Motor, Rounding};
 use planner::{PlacementOptions, PlanError, Settings, Surface, TimingLaw, Trajectory};
 use verify::Certificate;
 
@@ -55,6 +55,8 @@ pub struct Request {
     pub lift_overlap_s: f64,
     /// The time law along strokes.
     pub timing_law: TimingLaw,
+    /// How rows take whole ticks.
+    pub rounding: Rounding,
     /// Whether a plan that exceeds the motors' limits may be written; its certificate reports it.
     pub allow_over_limit: bool,
 }
@@ -321,6 +323,7 @@ pub fn compile<'a>(
         pen_speeds_mm_s: request.pen_speeds.clone(),
         timing_law: request.timing_law,
         lift_overlap_s: request.lift_overlap_s,
+        rounding: request.rounding,
         ..Settings::new(request.tolerance_mm, request.period_us)
     };
     let trajectory = plan(machine, ordered, &settings, progress)?;
@@ -339,6 +342,7 @@ pub fn compile<'a>(
         placement: placement.as_coeffs(),
         period_us: request.period_us,
         lift_overlap_us: (request.lift_overlap_s * 1e6).round() as u64,
+        rounding: request.rounding,
         pen_colors: request.pen_colors.clone(),
         rows: trajectory.row_count(),
         duration_us: trajectory.duration_us(),

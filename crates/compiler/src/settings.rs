@@ -43,6 +43,8 @@ pub struct Settings {
     pub law: &'static str,
     /// Time of one segment under a law of fixed durations, s.
     pub segment_time_s: Option<f64>,
+    /// How rows take whole ticks: `path` or `nearest`.
+    pub rounding: &'static str,
     /// Whether the motors' limits may be exceeded.
     pub allow_over_limit: bool,
 }
@@ -124,6 +126,7 @@ impl Settings {
             lift_overlap_s: request.lift_overlap_s,
             law,
             segment_time_s,
+            rounding: request.rounding.name(),
             allow_over_limit: request.allow_over_limit,
         }
     }

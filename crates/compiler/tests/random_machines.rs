@@ -46,6 +46,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         pen_colors: std::collections::BTreeMap::new(),
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::default(),
+        rounding: planner::Rounding::Path,
         allow_over_limit: false,
     };
     let drawing = Drawing { strokes };

@@ -38,6 +38,7 @@ impl Zot {
             pen_colors: std::collections::BTreeMap::new(),
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::TimeOptimal,
+            rounding: planner::Rounding::Path,
             allow_over_limit: false,
         };
         let compiled =

@@ -5,13 +5,13 @@
 //! dimensions, so a row holds two motor positions. [`mod@file`] reads and writes plans.
 //!
 //! ```
-//! use plan::{Header, Limits, Motor, Row, file};
+//! use plan::{Header, Limits, Motor, Rounding, Row, file};
 //!
 //! let limits = Limits { speed: 533.3, acceleration: 2666.7, jerk: None };
 //! let motors = ["arm1", "arm2"].map(|name| Motor { name: name.to_owned(), limits });
 //! let placement = [1.0, 0.0, 0.0, 1.0, 12.7, 76.2];
 //! let header =
-//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, lift_overlap_us: 0, rows: 2, duration_us: 10_000,
+//!     Header { machine: "coaxial".to_owned(), motors, placement, period_us: 10_000, lift_overlap_us: 0, rounding: Rounding::Path, rows: 2, duration_us: 10_000,
 //!         pen_colors: [(2, [204, 0, 0])].into() };
 //! let rows = [Row { t_us: 0, pen: 0, ticks: [800, 0] }, Row { t_us: 10_000, pen: 0, ticks: [801, -1] }];
 //!
@@ -63,6 +63,39 @@ pub struct Motor {
     pub limits: Limits,
 }
 
+/// How rows take whole ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rounding {
+    /// The nearest ticks: within 0.5 of the exact position.
+    #[default]
+    Nearest,
+    /// Ticks within 1.5 of the exact position, so that motion between rows stays near the path.
+    Path,
+}
+
+impl Rounding {
+    /// Its name in plan files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nearest => "nearest",
+            Self::Path => "path",
+        }
+    }
+
+    /// The rounding of this name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        [Self::Nearest, Self::Path].into_iter().find(|rounding| rounding.name() == name)
+    }
+
+    /// Largest distance of a row from its exact position, ticks of each motor.
+    pub fn farthest_ticks(self) -> f64 {
+        match self {
+            Self::Nearest => 0.5,
+            Self::Path => 1.5,
+        }
+    }
+}
+
 /// What is true of a whole plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
@@ -76,6 +109,8 @@ pub struct Header {
     pub period_us: u64,
     /// For how much of the time that a lift takes the motors may already travel, in microseconds; mostly 0.
     pub lift_overlap_us: u64,
+    /// How the rows take whole ticks.
+    pub rounding: Rounding,
     /// Red, green and blue of the pens whose colours the drawing states, by pen number.
     pub pen_colors: BTreeMap<u16, [u8; 3]>,
     /// How many rows there are.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use plan::file::{self, PlanFormat, ReadError, csv, is_plan, json, tick_lines};
-use plan::{Header, Limits, Motor, Row, TickTable};
+use plan::{Header, Limits, Motor, Rounding, Row, TickTable};
 use proptest::prelude::*;
 
 const FORMATS: [PlanFormat; 3] = [PlanFormat::Ticks, PlanFormat::Csv, PlanFormat::Json];
@@ -30,9 +30,10 @@ fn table() -> impl Strategy<Value = TickTable> {
     let rows = proptest::collection::vec(row, 1..60);
     let placement = proptest::array::uniform6(-1e4..1e4f64);
     let overlap = prop_oneof![Just(0u64), 1..1_000_000u64];
+    let rounding = prop_oneof![Just(Rounding::Nearest), Just(Rounding::Path)];
     let colors = proptest::collection::btree_map(1..9u16, any::<[u8; 3]>(), 0..4);
-    (rows, placement, limits(), limits(), 1..10_000_000u64, overlap, colors).prop_map(
-        |(steps, placement, a, b, period_us, lift_overlap_us, pen_colors)| {
+    (rows, placement, limits(), limits(), 1..10_000_000u64, (overlap, rounding), colors).prop_map(
+        |(steps, placement, a, b, period_us, (lift_overlap_us, rounding), pen_colors)| {
             let mut t_us = 0;
             let rows: Vec<Row> = steps
                 .into_iter()
@@ -49,6 +50,7 @@ fn table() -> impl Strategy<Value = TickTable> {
                 placement,
                 period_us,
                 lift_overlap_us,
+                rounding,
                 pen_colors,
                 rows: rows.len() as u64,
                 duration_us: t_us,
@@ -77,6 +79,7 @@ fn small() -> TickTable {
         placement: [1.0, 0.0, 0.0, 1.0, 12.7, 76.2],
         period_us: 10_000,
         lift_overlap_us: 0,
+        rounding: Rounding::Nearest,
         pen_colors: BTreeMap::new(),
         rows: rows.len() as u64,
         duration_us: 350_000,

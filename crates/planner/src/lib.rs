@@ -15,7 +15,9 @@
 //!    under the limits of the motors, of the pen and of linear motion between rows.
 //! 4. `stroke`: steps 1 to 3 for one stroke, from one of the poses in which the machine can begin.
 //! 5. `trajectory`: strokes, travel in joint space, pen lifts and drops in sequence, sampled at a
-//!    fixed period. Ticks are rounded from exact positions, so rounding errors do not accumulate.
+//!    fixed period.
+//! 6. `rounding`: whole ticks for each row, chosen so that motion between rows stays near the path.
+//!    Each row is within 1.5 ticks of its exact position, so rounding errors do not accumulate.
 //!
 //! [`plan()`] expects a drawing in machine mm; [`place`] maps drawing mm to machine mm. This
 //! crate knows neither HPGL nor output formats nor files.
@@ -59,6 +61,7 @@ mod error;
 mod joint_path;
 mod path;
 mod placement;
+mod rounding;
 mod settings;
 mod stroke;
 mod time_parametrization;
@@ -66,6 +69,7 @@ mod trajectory;
 mod travel;
 
 pub use error::PlanError;
+pub use plan::Rounding;
 pub use placement::{Mirror, PlacementOptions, Scale, Surface, beyond_sheet_mm, place};
 pub use settings::{Settings, TimingLaw};
 pub use time_parametrization::{Easing, LimitingConstraints};

@@ -2,6 +2,7 @@
 
 use drawing::{Drawing, Pen, Point, Stroke};
 use kinematics::{JointPos, Machine, MotorPos};
+use plan::Rounding;
 
 use crate::{
     error::PlanError,
@@ -23,6 +24,8 @@ pub struct Settings {
     pub lift_overlap_s: f64,
     /// The timing law along strokes. Travel is always time-optimal.
     pub timing_law: TimingLaw,
+    /// How rows take whole ticks.
+    pub rounding: Rounding,
 }
 
 /// The timing law along strokes.
@@ -43,7 +46,8 @@ pub enum TimingLaw {
 }
 
 impl Settings {
-    /// Time-optimal motion without lift overlap, every pen at the machine's limit.
+    /// Time-optimal motion without lift overlap, every pen at the machine's limit, rounded along the
+    /// path.
     pub fn new(tolerance_mm: f64, period_us: u64) -> Self {
         Self {
             tolerance_mm,
@@ -51,6 +55,7 @@ impl Settings {
             pen_speeds_mm_s: Vec::new(),
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::TimeOptimal,
+            rounding: Rounding::Path,
         }
     }
 

@@ -10,12 +10,13 @@ use std::collections::VecDeque;
 
 use drawing::{Drawing, Line, Segment, Stroke};
 use kinematics::{JointPos, Machine, OutOfReach};
-use plan::Row;
+use plan::{Rounding, Row};
 use rayon::prelude::*;
 
 use crate::{
     error::PlanError,
     joint_path::PathGeometry,
+    rounding::AlongPath,
     settings::{self, Settings, ToleranceBudget},
     stroke::{PathMotion, PlannedStroke, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
@@ -258,7 +259,7 @@ impl Trajectory<'_> {
             Some(cached) => Source::Cached(cached.iter()),
             None => Source::Planned(Box::new(self.motions())),
         };
-        Rows {
+        let samples = Samples {
             machine: self.machine,
             period_us: self.settings.period_us,
             source,
@@ -268,7 +269,12 @@ impl Trajectory<'_> {
             pen: 0,
             pose: self.machine.start(),
             finished: false,
-        }
+        };
+        let along_path = match self.settings.rounding {
+            Rounding::Nearest => None,
+            Rounding::Path => Some(Box::new(AlongPath::new(self.machine, self.settings.period_us))),
+        };
+        Rows { samples, along_path }
     }
 
     /// Drops the cached motions, so that the rows are planned again, as in a large plan. Returns
@@ -422,6 +428,34 @@ impl<'a> Source<'a> {
 /// Iterator over the rows of a trajectory.
 #[derive(Clone, Debug)]
 pub struct Rows<'a> {
+    samples: Samples<'a>,
+    /// Chooses the ticks; `None` for the nearest ones.
+    along_path: Option<Box<AlongPath<'a>>>,
+}
+
+impl Iterator for Rows<'_> {
+    type Item = ExactRow;
+
+    fn next(&mut self) -> Option<ExactRow> {
+        match &mut self.along_path {
+            None => self.samples.next().map(|sample| sample.row),
+            Some(along_path) => along_path.next(&mut self.samples),
+        }
+    }
+}
+
+/// A row rounded to the nearest ticks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample {
+    pub(crate) row: ExactRow,
+    pub(crate) pose: JointPos,
+    /// Whether the path may change its direction here: a motion starts.
+    pub(crate) may_turn: bool,
+}
+
+/// Iterator over the rows of a trajectory as they are sampled.
+#[derive(Clone, Debug)]
+struct Samples<'a> {
     machine: &'a Machine,
     period_us: u64,
     source: Source<'a>,
@@ -434,10 +468,10 @@ pub struct Rows<'a> {
     finished: bool,
 }
 
-impl Iterator for Rows<'_> {
-    type Item = ExactRow;
+impl Iterator for Samples<'_> {
+    type Item = Sample;
 
-    fn next(&mut self) -> Option<ExactRow> {
+    fn next(&mut self) -> Option<Sample> {
         loop {
             if self.motion.is_none() {
                 self.motion = self.source.next_motion();
@@ -447,15 +481,15 @@ impl Iterator for Rows<'_> {
                 None => {
                     let last = !self.finished;
                     self.finished = true;
-                    return last.then(|| self.emit());
+                    return last.then(|| self.sample(true));
                 }
                 Some(Motion::Pen { pen, periods }) => {
                     self.pen = *pen;
-                    let row = (*periods > 0).then(|| self.emit());
+                    let sample = (*periods > 0).then(|| self.sample(true));
                     self.t_us += periods * self.period_us;
                     self.motion = None;
-                    if row.is_some() {
-                        return row;
+                    if sample.is_some() {
+                        return sample;
                     }
                 }
                 Some(Motion::Path(motion)) if self.cursor.period == motion.periods => {
@@ -464,10 +498,10 @@ impl Iterator for Rows<'_> {
                 }
                 Some(Motion::Path(motion)) => {
                     self.pose = self.cursor.pose(self.machine, motion, &self.pose);
-                    let row = self.emit();
+                    let sample = self.sample(self.cursor.period == 0);
                     self.cursor.period += 1;
                     self.t_us += self.period_us;
-                    return Some(row);
+                    return Some(sample);
                 }
             }
         }
@@ -505,11 +539,12 @@ impl Cursor {
     }
 }
 
-impl Rows<'_> {
-    fn emit(&self) -> ExactRow {
+impl Samples<'_> {
+    fn sample(&self, may_turn: bool) -> Sample {
         let exact = self.machine.motor_positions(&self.pose);
         let exact = [exact[0], exact[1]];
-        ExactRow { row: Row { t_us: self.t_us, pen: self.pen, ticks: exact.map(to_ticks) }, exact }
+        let row = Row { t_us: self.t_us, pen: self.pen, ticks: exact.map(to_ticks) };
+        Sample { row: ExactRow { row, exact }, pose: self.pose, may_turn }
     }
 }
 

@@ -232,6 +232,9 @@ pub(crate) struct Planning {
     /// With --law linear, sine or quadratic: duration of each segment
     #[arg(long, value_name = "TIME", default_value = "500ms", value_parser = time)]
     pub(crate) segment_time: f64,
+    /// Choice of whole motor ticks: along the path, or nearest to the exact position
+    #[arg(long, value_enum, default_value_t = Rounding::Path)]
+    pub(crate) rounding: Rounding,
     /// Write the plan even if it exceeds the motors' limits, as laws of fixed duration may
     #[arg(long)]
     pub(crate) allow_over_limit: bool,
@@ -539,6 +542,15 @@ pub(crate) enum Law {
     Sine,
     /// Each segment in --segment-time, from rest to rest: 2 x² and back
     Quadratic,
+}
+
+/// How rows take whole motor ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Rounding {
+    /// Within 1.5 ticks, so that the motion from row to row stays near the path
+    Path,
+    /// The nearest ticks
+    Nearest,
 }
 
 /// Source of the drawing speed.

@@ -131,6 +131,10 @@ fn request(planning: &Planning, crop: Option<Crop>, page: &Page, machine: &Machi
         // The pen is off the paper long before it is all the way up.
         lift_overlap_s: if planning.overlap_lifts { 0.5 * machine.pen().lift_time_s } else { 0.0 },
         timing_law: timing_law(planning),
+        rounding: match planning.rounding {
+            cli::Rounding::Path => plan::Rounding::Path,
+            cli::Rounding::Nearest => plan::Rounding::Nearest,
+        },
         allow_over_limit: planning.allow_over_limit,
     }
 }

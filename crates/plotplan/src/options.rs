@@ -9,7 +9,7 @@ use crate::cli::{self, Format};
 use crate::failure::Failure;
 
 /// Options of planning proper.
-const PLANNING: [&str; 12] = [
+const PLANNING: [&str; 13] = [
     "tolerance",
     "period",
     "order",
@@ -21,11 +21,12 @@ const PLANNING: [&str; 12] = [
     "overlap_lifts",
     "law",
     "segment_time",
+    "rounding",
     "allow_over_limit",
 ];
 /// Options of planning that drawings have no use for: they hold no motion.
-const MOTION: [&str; 7] =
-    ["tolerance", "period", "speed", "overlap_lifts", "law", "segment_time", "allow_over_limit"];
+const MOTION: [&str; 8] =
+    ["tolerance", "period", "speed", "overlap_lifts", "law", "segment_time", "rounding", "allow_over_limit"];
 /// Options of placement.
 const PLACEMENT: [&str; 8] = ["fit", "shrink", "align", "place", "scale", "rotate", "mirror", "margin"];
 /// Options of placement that need a sheet.
@@ -262,7 +263,7 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 37] = [
+    const VALUES: [(&str, Option<&str>); 38] = [
         ("--tolerance", Some("0.2mm")),
         ("--period", Some("20ms")),
         ("--order", Some("optimize")),
@@ -274,6 +275,7 @@ mod tests {
         ("--overlap-lifts", None),
         ("--law", Some("trapezoid")),
         ("--segment-time", Some("1s")),
+        ("--rounding", Some("nearest")),
         ("--allow-over-limit", None),
         ("--fit", None),
         ("--shrink", None),

@@ -88,7 +88,7 @@ fn measure(name: &str, machine: &Machine, drawing: &Drawing, step: f64, period_u
         return;
     }
     let rows = rows(machine, drawing, step, period_us);
-    let timing = Timing { period_us, lift_overlap_us: 0 };
+    let timing = Timing { period_us, lift_overlap_us: 0, rounding: plan::Rounding::Nearest };
     let began = Instant::now();
     let mut verifier = Verifier::new(machine, drawing, timing, 0.1);
     let built = began.elapsed();

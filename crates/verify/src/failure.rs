@@ -206,12 +206,14 @@ pub enum Violation {
         strokes: u64,
     },
     /// A row's ticks are not the rounded exact motor position.
-    #[error("motor {motor} is {by_ticks:.3} ticks from its exact position; rounding accounts for 0.5")]
+    #[error("motor {motor} is {by_ticks:.3} ticks from its exact position; rounding accounts for {allowed_ticks}")]
     Drift {
         /// The motor.
         motor: String,
         /// The difference, ticks.
         by_ticks: f64,
+        /// The difference that the plan's rounding may have, ticks.
+        allowed_ticks: f64,
     },
     /// A position or distance is not a finite number.
     #[error("a position is not a finite number")]

@@ -21,7 +21,7 @@
 //! ```
 //! use drawing::{Drawing, Pen, Point, Rect, Span, Stroke};
 //! use kinematics::{Cartesian, JointPos, Machine, MachineParts, Motor, PenLimits};
-//! use plan::Row;
+//! use plan::{Rounding, Row};
 //! use verify::{Timing, Violation, certify};
 //!
 //! // A Cartesian machine: 10 ticks/mm, at most 1000 ticks/s and 10,000 ticks/s².
@@ -48,7 +48,7 @@
 //!         Row { t_us: 100_000 * k, pen, ticks: [ticks[k as usize], 0] }
 //!     })
 //!     .collect();
-//! let timing = Timing { period_us: 100_000, lift_overlap_us: 0 };
+//! let timing = Timing { period_us: 100_000, lift_overlap_us: 0, rounding: Rounding::Nearest };
 //! let verify = |rows: &[Row]| {
 //!     certify(&machine, &drawing, timing, 0.1, || rows.iter().map(|row| (*row, None)))
 //! };

@@ -2,7 +2,7 @@
 
 use drawing::{Drawing, Point};
 use kinematics::{JointPos, Machine, MotorPos};
-use plan::{Header, MOTORS, Row};
+use plan::{Header, MOTORS, Rounding, Row};
 
 use crate::{
     Certificate, Deviation, Location, PenMotion, Violation,
@@ -85,11 +85,14 @@ pub struct Timing {
     pub period_us: u64,
     /// Part of the lift time in which the motors may already travel, us.
     pub lift_overlap_us: u64,
+    /// How far rows may be from exact positions.
+    pub rounding: Rounding,
 }
 
 impl From<&Header> for Timing {
     fn from(header: &Header) -> Self {
-        Self { period_us: header.period_us, lift_overlap_us: header.lift_overlap_us }
+        let Header { period_us, lift_overlap_us, rounding, .. } = *header;
+        Self { period_us, lift_overlap_us, rounding }
     }
 }
 
@@ -285,8 +288,9 @@ impl<'a> Verifier<'a> {
         for (motor, (ticks, exact)) in row.ticks.into_iter().zip(exact).enumerate() {
             let by_ticks = (ticks as f64 - exact).abs();
             self.largest_rounding = self.largest_rounding.max(by_ticks);
-            if by_ticks > 0.5 + 1e-6 {
-                let violation = Violation::Drift { motor: self.motor_name(motor), by_ticks };
+            let allowed_ticks = self.timing.rounding.farthest_ticks();
+            if by_ticks > allowed_ticks + 1e-6 {
+                let violation = Violation::Drift { motor: self.motor_name(motor), by_ticks, allowed_ticks };
                 self.failures.note(violation, motor, by_ticks, here);
             }
         }

@@ -371,6 +371,7 @@ fn emission_seconds(machine: &Machine, trajectory: &Trajectory<'_>) -> Result<f6
         period_us: PERIOD_US,
         rows: trajectory.row_count(),
         lift_overlap_us: 0,
+        rounding: plan::Rounding::Nearest,
         pen_colors: std::collections::BTreeMap::new(),
         duration_us: trajectory.duration_us(),
     };

@@ -34,6 +34,7 @@ fn planned(machine: &Machine) -> Result<(Vec<Row>, Drawing)> {
         pen_colors: BTreeMap::new(),
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::TimeOptimal,
+        rounding: planner::Rounding::Path,
         allow_over_limit: false,
     };
     let compiled = pipeline::compile(&document.pages[0].drawing, machine, &request, &|_| {})?;

@@ -67,6 +67,7 @@ pub fn plan(strokes: &[(u16, &[[i64; 2]])]) -> TickTable {
         period_us: PERIOD_US,
         rows: rows.len() as u64,
         lift_overlap_us: 0,
+        rounding: plan::Rounding::Nearest,
         pen_colors: std::collections::BTreeMap::new(),
         duration_us: rows.last().unwrap().t_us,
     };

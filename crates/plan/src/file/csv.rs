@@ -21,7 +21,7 @@
 
 use std::io::Write;
 
-use crate::{Header, Limits, MOTORS, Motor, Row, TickTable};
+use crate::{Header, Limits, MOTORS, Motor, Rounding, Row, TickTable};
 
 use super::header::{Notes, RowCheck, assemble, hex};
 use super::text::{Line, Text, lines, parse_signed, parse_unsigned, shown};
@@ -52,6 +52,9 @@ pub fn write<W: Write + ?Sized>(
     text.str("\n# period_us: ").int(header.period_us);
     if header.lift_overlap_us > 0 {
         text.str("\n# lift_overlap_us: ").int(header.lift_overlap_us);
+    }
+    if header.rounding != Rounding::Nearest {
+        text.str("\n# rounding: ").str(header.rounding.name());
     }
     for (pen, color) in &header.pen_colors {
         text.str("\n# pen ").int(*pen).str(" color: ").str(&hex(*color));
@@ -134,6 +137,7 @@ pub fn read(bytes: &[u8]) -> Result<TickTable, ReadError> {
         motors,
         placement,
         [notes.count("period_us")?, notes.count("lift_overlap_us")?],
+        notes.rounding()?,
         notes.pen_colors(),
         &rows,
     )?;

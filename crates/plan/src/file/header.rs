@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::{Header, Limits, MOTORS, Motor, Row};
+use crate::{Header, Limits, MOTORS, Motor, Rounding, Row};
 
 use super::text::{Line, shown};
 use super::{HeaderError, ReadError, RowsError};
@@ -153,6 +153,16 @@ impl<'a> Notes<'a> {
         }
     }
 
+    /// How rows take whole ticks: to the nearest, unless it is stated.
+    pub(crate) fn rounding(&self) -> Result<Rounding, ReadError> {
+        let Some((line, value)) = self.find("rounding") else { return Ok(Rounding::Nearest) };
+        Rounding::of_name(value).ok_or_else(|| ReadError::Unexpected {
+            line,
+            expected: "`nearest` or `path` after `rounding:`".to_owned(),
+            found: shown(value.as_bytes()),
+        })
+    }
+
     /// `least` to `most` finite numbers.
     pub(crate) fn numbers(
         &self,
@@ -224,6 +234,7 @@ pub(crate) fn assemble(
     motors: [Motor; MOTORS],
     placement: [f64; 6],
     [period_us, lift_overlap_us]: [Option<u64>; 2],
+    rounding: Rounding,
     pen_colors: BTreeMap<u16, [u8; 3]>,
     rows: &[Row],
 ) -> Result<Header, HeaderError> {
@@ -234,6 +245,7 @@ pub(crate) fn assemble(
         placement,
         period_us: period_us.unwrap_or_else(shortest),
         lift_overlap_us: lift_overlap_us.unwrap_or(0),
+        rounding,
         pen_colors,
         rows: rows.len() as u64,
         duration_us: rows.last().map_or(0, |row| row.t_us),

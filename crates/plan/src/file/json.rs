@@ -18,7 +18,7 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use crate::{Header, Limits, MOTORS, Motor, Row, TickTable};
+use crate::{Header, Limits, MOTORS, Motor, Rounding, Row, TickTable};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -139,6 +139,9 @@ fn write_header<W: Write + ?Sized>(text: &mut Text<'_, W>, header: &Header) {
     if header.lift_overlap_us > 0 {
         text.str(",\n    \"lift_overlap_us\": ").int(header.lift_overlap_us);
     }
+    if header.rounding != Rounding::Nearest {
+        text.str(",\n    \"rounding\": \"").str(header.rounding.name()).byte(b'"');
+    }
     for (index, (pen, color)) in header.pen_colors.iter().enumerate() {
         text.str(if index == 0 { ",\n    \"pen_colors\": {\"" } else { ", \"" }).int(*pen);
         text.str("\": \"").str(&hex(*color)).byte(b'"');
@@ -198,9 +201,19 @@ struct WirePlan {
     #[serde(default)]
     lift_overlap_us: u64,
     #[serde(default)]
+    rounding: WireRounding,
+    #[serde(default)]
     pen_colors: BTreeMap<u16, String>,
     rows: u64,
     duration_us: u64,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum WireRounding {
+    #[default]
+    Nearest,
+    Path,
 }
 
 #[derive(Deserialize)]
@@ -246,6 +259,10 @@ pub fn read(bytes: &[u8]) -> Result<(Document, TickTable), ReadError> {
         placement: plan.placement,
         period_us: plan.period_us,
         lift_overlap_us: plan.lift_overlap_us,
+        rounding: match plan.rounding {
+            WireRounding::Nearest => Rounding::Nearest,
+            WireRounding::Path => Rounding::Path,
+        },
         pen_colors: plan.pen_colors.iter().filter_map(|(pen, text)| Some((*pen, color(text)?))).collect(),
         rows: plan.rows,
         duration_us: plan.duration_us,

@@ -16,7 +16,7 @@
 
 use std::io::Write;
 
-use crate::{Header, Limits, MOTORS, Motor, Row, TickTable};
+use crate::{Header, Limits, MOTORS, Motor, Rounding, Row, TickTable};
 
 use super::header::{Notes, RowCheck, assemble, hex};
 use super::text::{Line, Text, lines, parse_signed, parse_unsigned, shown};
@@ -86,6 +86,9 @@ fn write_header<W: Write + ?Sized>(text: &mut Text<'_, W>, header: &Header) {
     text.str("; period_us: ").int(header.period_us);
     if header.lift_overlap_us > 0 {
         text.str("\n; lift_overlap_us: ").int(header.lift_overlap_us);
+    }
+    if header.rounding != Rounding::Nearest {
+        text.str("\n; rounding: ").str(header.rounding.name());
     }
     for (pen, color) in &header.pen_colors {
         text.str("\n; pen ").int(*pen).str(" color: ").str(&hex(*color));
@@ -229,6 +232,7 @@ fn read_header(notes: &Notes<'_>, begin: Line, rows: &[Row]) -> Result<Header, R
         motors,
         [a, b, c, d, e, f],
         [notes.count("period_us")?, notes.count("lift_overlap_us")?],
+        notes.rounding()?,
         notes.pen_colors(),
         rows,
     )?)

@@ -88,13 +88,14 @@ pub fn header(machine: &Machine) -> Header {
         period_us: PERIOD_US,
         rows: 0,
         lift_overlap_us: 0,
+        rounding: plan::Rounding::Nearest,
         pen_colors: std::collections::BTreeMap::new(),
         duration_us: 0,
     }
 }
 
 pub fn timing() -> Timing {
-    Timing { period_us: PERIOD_US, lift_overlap_us: 0 }
+    Timing { period_us: PERIOD_US, lift_overlap_us: 0, rounding: plan::Rounding::Nearest }
 }
 
 /// A drawing of polylines; stroke `i` has the source byte `i`.
@@ -232,7 +233,7 @@ impl<'a> Plotter<'a> {
     }
 
     pub fn verify_as(&self, drawing: &Drawing, tolerance: f64, exact: bool) -> Certificate {
-        let timing = Timing { period_us: self.period_us, lift_overlap_us: 0 };
+        let timing = Timing { period_us: self.period_us, lift_overlap_us: 0, rounding: plan::Rounding::Nearest };
         let mut verifier = Verifier::new(self.machine, drawing, timing, tolerance);
         for (index, row) in self.rows.iter().enumerate() {
             verifier.row(*row, exact.then(|| self.exact[index]));
