@@ -19,9 +19,15 @@ pub struct Certificate {
     pub after_rounding: Deviation,
     /// The quantization error of this machine along this ink, independent of the planner.
     pub quantization_error: QuantizationError,
-    /// Largest distance of a row's ticks from its exact motor positions: at most 1/2 if rounding
-    /// does not drift. `None` unless every row came with exact positions.
+    /// How the rows take whole ticks, as the plan states it.
+    pub rounding: plan::Rounding,
+    /// Largest distance of a row's ticks from its exact motor positions: at most
+    /// [`plan::Rounding::farthest_ticks`] if rounding does not drift. `None` unless every row came
+    /// with exact positions.
     pub largest_rounding_ticks: Option<f64>,
+    /// Largest distance of the pen, while it is down, from its exact position at the same row, mm:
+    /// mostly early or late along the path. `None` as above.
+    pub largest_shift_mm: Option<f64>,
     /// The pens that drew, each once, in the order of first use.
     pub pens: Vec<u16>,
     /// Peaks of each motor, in the order of the columns.

@@ -123,6 +123,7 @@ pub struct Verifier<'a> {
     /// The path of the exact motor positions.
     before: Option<Trace>,
     largest_rounding: f64,
+    largest_shift_mm: f64,
     quantization: Quantization,
     travel_mm: f64,
     pen_downs: u64,
@@ -210,6 +211,7 @@ impl<'a> Verifier<'a> {
             before: None,
             target,
             largest_rounding: 0.0,
+            largest_shift_mm: 0.0,
             quantization: Quantization::default(),
             travel_mm: 0.0,
             pen_downs: 0,
@@ -247,6 +249,10 @@ impl<'a> Verifier<'a> {
         }
         self.check_joints(&ticks, here);
         self.check_rounding(row, exact, here);
+        if let (Some(exact), true) = (&exact_pose, row.pen != 0) {
+            let shift = ticks.point - exact.point;
+            self.largest_shift_mm = self.largest_shift_mm.max(shift.hypot2().sqrt());
+        }
         let current = Previous { row, index, ticks, exact: exact_pose, exact_ticks: exact };
         if exact.is_none() {
             self.exact = None;
@@ -492,7 +498,9 @@ impl<'a> Verifier<'a> {
             holds: failures.is_empty(),
             failures,
             tolerance_mm: self.tolerance,
+            rounding: self.timing.rounding,
             largest_rounding_ticks: before_rounding.as_ref().map(|_| self.largest_rounding),
+            largest_shift_mm: before_rounding.as_ref().map(|_| self.largest_shift_mm),
             before_rounding: before_rounding.map(|(deviation, _)| deviation),
             after_rounding,
             quantization_error,

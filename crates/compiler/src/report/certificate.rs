@@ -21,8 +21,13 @@ pub struct CertificateReport {
     pub after_rounding: Option<DeviationReport>,
     /// The quantization error of this machine along this ink.
     pub tick_floor: TickFloor,
-    /// Largest distance of a row from its exact position, ticks.
+    /// How rows take whole ticks: `path` or `nearest`.
+    pub rounding: &'static str,
+    /// Largest distance of a row from its exact position, ticks; `null` where that is not known.
     pub largest_rounding_ticks: Option<f64>,
+    /// Largest distance of the pen, while it is down, from its exact position at the same row, mm: mostly
+    /// early or late along the path. `null` where that is not known.
+    pub largest_shift_mm: Option<f64>,
     /// The pens that draw, in the order of their first use.
     pub pens: Vec<u16>,
     /// Peaks of each motor.
@@ -139,7 +144,9 @@ impl CertificateReport {
                 worst_mm: round::mm(certificate.quantization_error.worst_mm),
                 rms_mm: round::mm(certificate.quantization_error.rms_mm),
             },
+            rounding: certificate.rounding.name(),
             largest_rounding_ticks: certificate.largest_rounding_ticks.map(round::ticks),
+            largest_shift_mm: certificate.largest_shift_mm.map(round::mm),
             pens: certificate.pens.clone(),
             motors: certificate.motors.iter().map(MotorReport::of).collect(),
             rows: certificate.rows,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use drawing::Drawing;
 use kinematics::Machine;
+use plan::Rounding;
 use verify::{Certificate, Deviation, DeviationStats};
 
 use crate::pipeline::Compiled;
@@ -92,7 +93,11 @@ pub fn certificate(certificate: &Certificate) -> String {
     if let Some(before) = &certificate.before_rounding {
         deviation_text(&mut text, "before rounding to ticks", before);
     }
-    deviation_text(&mut text, "in whole ticks", &certificate.after_rounding);
+    let ticks = match certificate.rounding {
+        Rounding::Nearest => "in whole ticks",
+        Rounding::Path => "in whole ticks, chosen along the path",
+    };
+    deviation_text(&mut text, ticks, &certificate.after_rounding);
     text + &details(certificate)
 }
 
@@ -135,8 +140,20 @@ fn details(certificate: &Certificate) -> String {
         }
         text.push('\n');
     }
-    if let Some(rounding) = certificate.largest_rounding_ticks {
-        let _ = writeln!(text, "  no drift: every row is within {rounding:.3} ticks of the exact position");
+    if let (Some(ticks), Some(shift)) = (certificate.largest_rounding_ticks, certificate.largest_shift_mm) {
+        let _ = write!(text, "  no drift: every row is within {ticks:.3} ticks of the exact position");
+        let half_tick = certificate.quantization_error.worst_mm;
+        match certificate.rounding {
+            Rounding::Nearest => text.push('\n'),
+            Rounding::Path => {
+                let _ = writeln!(
+                    text,
+                    ", the pen at most {shift:.4} mm early or late;\n  \
+                     rows are chosen within half a tick of the path ({half_tick:.4} mm), motion between \
+                     rows is replayed"
+                );
+            }
+        }
     }
     for failure in &certificate.failures {
         let _ = writeln!(text, "  FAILED: {failure}");

@@ -11,8 +11,8 @@
 //! the path between the feet, the search minimizes the sum over all rows of
 //!
 //! ```text
-//! max(l, |ds|) mean of g(d(f)) + 0.05 h² (l - ds)              b -> c:  l = |P_c - P_b|, ds = s_c - s_b
-//!   + 0.01 h³ Σ (second differences)² + 0.01 h³ |e|²           g(d) = d² (1 + 100 (d / h)⁴)
+//! max(l, |ds|) mean of g(d(f)) + 0.3 h² (l - ds)               b -> c:  l = |P_c - P_b|, ds = s_c - s_b
+//!   + 0.01 h³ Σ (second differences)² + 0.01 h³ |e|²           g(d) = d² (1 + 200 (d / h)⁴)
 //! ```
 //!
 //! The first term is the deviation, counted both ways because points are matched by arc length; the

@@ -21,8 +21,8 @@ const WINDOW: usize = 24;
 const BLOCK: usize = 8;
 
 /// The weights of the cost, see the documentation of [`super`].
-const FAR: f64 = 100.0;
-const LENGTH: f64 = 0.05;
+const FAR: f64 = 200.0;
+const LENGTH: f64 = 0.3;
 const ROUGHNESS: f64 = 0.01;
 const TIMING: f64 = 0.01;
 
