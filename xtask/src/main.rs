@@ -36,6 +36,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bench read [GENERATOR]
                 bytes to drawing: throughput, scaling and memory, compared with hp2xx; inputs from
                 the script GENERATOR (python3) or built in
+  bench rounding [DIR]
+                ink of whole ticks along the path and of the nearest ticks, on the examples and the
+                drawings in DIR: distances from the exact path, CPU time
   bench simulate
       speed of simulations and of a search of gains
   bench plan [PYTHON]
@@ -61,6 +64,8 @@ fn main() -> ExitCode {
         ["bench", "read"] => bench::read(None),
         ["bench", "read", generator] => bench::read(Some(generator.as_ref())),
         ["bench", "read-once", file] => bench::read_once(file.as_ref()),
+        ["bench", "rounding"] => bench::rounding(None),
+        ["bench", "rounding", folder] => bench::rounding(Some(folder.as_ref())),
         ["bench", "simulate"] => bench::simulate(),
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),

@@ -2,8 +2,9 @@
 //!
 //! Where strokes are that close, examining all of them for every run takes too long. Then only
 //! those stretches of strokes are examined that have stayed near since the pen came here. Every
-//! distance found this way is still an upper bound. What may be lost is that ink covers a stroke in
-//! passing; so a table that fails while following is measured again in full, see
+//! distance found this way is still an upper bound. Strokes that begin or end near the pen join in,
+//! because ordering may have joined them to the one that is being drawn. What may be lost is that ink
+//! covers a stroke in passing; so a table that fails while following is measured again in full, see
 //! [`crate::certify`].
 
 use std::collections::VecDeque;
@@ -71,6 +72,14 @@ impl Follower {
         };
         let stroke = |index: u32| strokes.pieces[index as usize].stroke;
         let count = strokes.pieces.len() as u32;
+        let followed = &mut self.followed;
+        let before = followed.len();
+        strokes.visit_ends(bounds, |index, _| {
+            if meets(index) && !followed.iter().any(|stretch| stretch.contains(&index)) {
+                followed.push(index..index + 1);
+            }
+        });
+        let joined = followed.len() > before;
         candidates.clear();
         self.followed.retain_mut(|stretch| {
             let own = stroke(stretch.start);
@@ -89,6 +98,11 @@ impl Follower {
             candidates.extend(stretch.clone().map(|index| (0.0, index)));
             stretch.start < stretch.end
         });
+        if joined {
+            // Two ends of one stroke may have grown together.
+            self.followed.sort_unstable_by_key(|stretch| (stretch.start, stretch.end));
+            self.followed.dedup();
+        }
         // Near enough that a plan that holds need not look further.
         let near = |point: Point| {
             let mut pieces = candidates.iter().map(|(_, index)| &strokes.pieces[*index as usize]);

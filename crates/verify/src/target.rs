@@ -112,6 +112,14 @@ pub(crate) struct PenTarget {
     pub(crate) pen: u16,
     /// In the order of the strokes, and within a stroke along it.
     pub(crate) pieces: Vec<Piece>,
+    all: BoxTree,
+    /// The first and last pieces of the strokes.
+    ends: BoxTree,
+}
+
+/// A bounding box tree of some pieces.
+#[derive(Clone, Debug)]
+struct BoxTree {
     /// Their indices by location, see [`by_position`].
     order: Vec<u32>,
     /// `levels[0][i]` bounds the pieces `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the
@@ -119,9 +127,10 @@ pub(crate) struct PenTarget {
     levels: Vec<Vec<Rect>>,
 }
 
-impl PenTarget {
-    fn new(pen: u16, pieces: Vec<Piece>) -> Self {
-        let order = by_position(&pieces);
+impl BoxTree {
+    /// Of at least one piece.
+    fn new(pieces: &[Piece], of: Vec<u32>) -> Self {
+        let order = by_position(pieces, of);
         let mut levels: Vec<Vec<Rect>> = Vec::new();
         let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
         let bounds = |chunk: &[u32]| chunk.iter().map(|i| pieces[*i as usize].bounds()).collect::<Vec<_>>();
@@ -132,11 +141,10 @@ impl PenTarget {
             levels.push(std::mem::replace(&mut level, next));
         }
         levels.push(level);
-        Self { pen, pieces, order, levels }
+        Self { order, levels }
     }
 
-    /// Calls `to` with the index and bounding box of every piece whose box meets `bounds`.
-    pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32, Rect)) {
+    fn visit(&self, pieces: &[Piece], bounds: Rect, mut to: impl FnMut(u32, Rect)) {
         let mut open = vec![(self.levels.len() - 1, 0)];
         while let Some((level, index)) = open.pop() {
             if !meet(self.levels[level][index], bounds) {
@@ -149,7 +157,7 @@ impl PenTarget {
                 );
             } else {
                 for &i in &self.order[children.start..children.end.min(self.order.len())] {
-                    let piece = self.pieces[i as usize].bounds();
+                    let piece = pieces[i as usize].bounds();
                     if meet(piece, bounds) {
                         to(i, piece);
                     }
@@ -157,11 +165,35 @@ impl PenTarget {
             }
         }
     }
+}
+
+impl PenTarget {
+    fn new(pen: u16, pieces: Vec<Piece>) -> Self {
+        let all = BoxTree::new(&pieces, (0..pieces.len() as u32).collect());
+        let stroke = |index: usize| pieces.get(index).map(|piece| piece.stroke);
+        let is_end = |index: &u32| {
+            let index = *index as usize;
+            index == 0 || stroke(index - 1) != stroke(index) || stroke(index) != stroke(index + 1)
+        };
+        let ends = BoxTree::new(&pieces, (0..pieces.len() as u32).filter(is_end).collect());
+        Self { pen, pieces, all, ends }
+    }
+
+    /// Calls `to` with the index and bounding box of every piece whose box meets `bounds`.
+    pub(crate) fn visit(&self, bounds: Rect, to: impl FnMut(u32, Rect)) {
+        self.all.visit(&self.pieces, bounds, to);
+    }
+
+    /// The same for the first and last pieces of strokes only.
+    pub(crate) fn visit_ends(&self, bounds: Rect, to: impl FnMut(u32, Rect)) {
+        self.ends.visit(&self.pieces, bounds, to);
+    }
 
     /// The nearest piece to `p` and its distance, by branch and bound.
     pub(crate) fn nearest(&self, p: Point) -> (f64, u32) {
+        let BoxTree { order, levels } = &self.all;
         let mut best = (f64::INFINITY, 0);
-        let mut open = vec![(0.0, self.levels.len() - 1, 0)];
+        let mut open = vec![(0.0, levels.len() - 1, 0)];
         while let Some((at_least, level, index)) = open.pop() {
             if at_least > best.0 {
                 continue;
@@ -169,13 +201,13 @@ impl PenTarget {
             let children = FAN * index..FAN * (index + 1);
             if level > 0 {
                 let first = open.len();
-                for i in children.take_while(|i| *i < self.levels[level - 1].len()) {
-                    open.push((distance_to_box(p, self.levels[level - 1][i]), level - 1, i));
+                for i in children.take_while(|i| *i < levels[level - 1].len()) {
+                    open.push((distance_to_box(p, levels[level - 1][i]), level - 1, i));
                 }
                 // The nearest box is visited first.
                 open[first..].sort_by(|a, b| b.0.total_cmp(&a.0));
             } else {
-                for &i in &self.order[children.start..children.end.min(self.order.len())] {
+                for &i in &order[children.start..children.end.min(order.len())] {
                     let piece = &self.pieces[i as usize];
                     let distance = piece.distance(piece.local(p));
                     if distance < best.0 {
@@ -188,10 +220,9 @@ impl PenTarget {
     }
 }
 
-/// The indices of the pieces along a Morton (Z-order) curve through their midpoints, so that
+/// The indices of some pieces along a Morton (Z-order) curve through their midpoints, so that
 /// neighbours share boxes.
-fn by_position(pieces: &[Piece]) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
+fn by_position(pieces: &[Piece], mut order: Vec<u32>) -> Vec<u32> {
     let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return order };
     let scale = 65535.0 / all.width().max(all.height()).max(f64::MIN_POSITIVE);
     let spread = |value: f64| {

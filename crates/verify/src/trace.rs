@@ -162,8 +162,9 @@ impl Trace {
                 self.follower.remember(run, before, self.radius);
             }
             let largest = self.bound_along(strokes, &run, nearest, common);
-            if following && largest > FOLLOWED * self.radius {
-                // A stroke that is not followed may be nearer.
+            let known = self.worst.map_or(0.0, |worst| worst.mm);
+            if following && (largest > FOLLOWED * self.radius || largest > known) {
+                // A stroke that is not followed may be nearer. All strokes are looked at for the maximum.
                 self.follower.fail();
                 following = false;
                 continue;

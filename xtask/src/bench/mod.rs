@@ -3,6 +3,7 @@
 mod inputs;
 mod plan;
 mod read;
+mod rounding;
 mod simulate;
 mod workload;
 
@@ -29,6 +30,16 @@ pub(crate) fn simulate() -> Result<bool> {
         return released(&["simulate".as_ref()]);
     }
     simulate::run()
+}
+
+/// `bench rounding`; true if all goals were met.
+pub(crate) fn rounding(folder: Option<&Path>) -> Result<bool> {
+    if cfg!(debug_assertions) {
+        let folder = folder.map(std::path::absolute).transpose()?;
+        let arguments = folder.iter().map(AsRef::as_ref);
+        return released(&std::iter::once("rounding".as_ref()).chain(arguments).collect::<Vec<&OsStr>>());
+    }
+    rounding::run(folder)
 }
 
 /// `bench read`; true if all goals were met.
