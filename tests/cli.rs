@@ -448,6 +448,14 @@ fn plans_for_every_machine() {
         dir.succeed("preview plan.csv --output plan.svg");
         assert_picture(&format!("plan_{machine}.svg"), &dir.bytes("plan.svg"));
     }
+    for machine in ["coaxial", "corexy"] {
+        let command = format!("convert tiny.hpgl --machine {machine} --period 100ms --report json");
+        let said =
+            dir.succeed(&format!("{command} --rounding nearest --format csv --output plan.csv"));
+        let report = said.err.lines().last().expect("a report on the last line");
+        let plan = format!("{}\n\n{}", plan_summary(report), dir.text("plan.csv"));
+        insta::assert_snapshot!(format!("plan_{machine}_nearest"), plan);
+    }
     let said = dir.succeed("convert tiny.hpgl --machine corexy --period 100ms --report json");
     let report = said.err.lines().last().expect("a report on the last line");
     insta::assert_snapshot!("plan_corexy_ticks", format!("{}\n\n{}", plan_summary(report), said.text()));

@@ -120,17 +120,21 @@ proptest! {
         let nearest = rows(&machine, &placed, &settings, Rounding::Nearest);
         let along = rows(&machine, &placed, &settings, Rounding::Path);
         prop_assert_eq!(nearest.len(), along.len());
-        let mut pen = 0;
         for (near, row) in nearest.iter().zip(&along) {
             prop_assert_eq!((near.row.t_us, near.row.pen, near.exact), (row.row.t_us, row.row.pen, row.exact));
             for motor in 0..2 {
                 prop_assert_eq!(near.row.ticks[motor], near.exact[motor].round() as i64);
                 prop_assert!((row.row.ticks[motor] as f64 - row.exact[motor]).abs() <= 1.5);
             }
-            pen = pen.max(row.row.pen);
         }
         prop_assert_eq!(nearest[0].row, along[0].row);
         prop_assert_eq!(nearest[nearest.len() - 1].row, along[along.len() - 1].row);
+        // While the pen moves the motors rest, wherever the nearest ticks do.
+        for (near, pair) in nearest.windows(2).zip(along.windows(2)) {
+            if near[1].row.t_us - near[0].row.t_us > period_us {
+                prop_assert_eq!(pair[0].row.ticks, pair[1].row.ticks);
+            }
+        }
         check_differences(&machine, period_us, &filled(&nearest, period_us), &filled(&along, period_us));
     }
 }
@@ -211,6 +215,23 @@ fn rows_do_not_depend_on_threads_or_cache() {
         })
     };
     assert_eq!(with(1), with(3));
+}
+
+/// The pen goes down where the plan starts: the motors rest there until it is down.
+#[test]
+fn stroke_from_start_pose_waits_for_the_pen() {
+    let machine = machines::corexy();
+    let start = machine.mechanism().forward(&machine.start());
+    let stroke = Stroke::polyline(
+        Pen(1),
+        vec![start, start + (20.3, 7.7), start + (3.1, 18.4), start],
+        Span::default(),
+    );
+    let drawing = Drawing { strokes: vec![stroke.expect("points")] };
+    let along = rows(&machine, &drawing, &Settings::new(0.1, 10_000), Rounding::Path);
+    let down = along.iter().position(|row| row.row.pen != 0).expect("ink");
+    assert_eq!(along[down].row.ticks, along[down + 1].row.ticks);
+    assert_eq!(along[0].row.ticks, along[down].row.ticks);
 }
 
 /// Pen events rest on one pair of ticks, the one nearest to the path if the limits leave room for it.

@@ -105,6 +105,13 @@ struct Step {
     geometry: Option<Geometry>,
 }
 
+impl Step {
+    /// Whether the motors stand still from one to the other.
+    fn is_at(&self, other: &Self) -> bool {
+        (0..2).all(|motor: usize| (self.row.exact[motor] - other.row.exact[motor]).abs() < 1e-6)
+    }
+}
+
 /// Chooses the ticks of the rows of a plan, as a stream.
 #[derive(Clone, Debug)]
 pub(crate) struct AlongPath<'a> {
@@ -251,27 +258,22 @@ impl<'a> AlongPath<'a> {
     /// Makes the safe ticks and bounds of the next steps final: one step, or all steps of a rest.
     fn make_safe(&mut self) {
         let first = self.steps[self.safe];
-        let stands = |step: &&Step| {
-            (0..2).all(|motor: usize| (step.row.exact[motor] - first.row.exact[motor]).abs() < 1e-6)
-        };
-        let count = self.steps.range(self.safe..).take(LONGEST_REST).take_while(stands).count();
-        let end = self.safe + count;
-        let pens = self.steps.range(self.safe..end).map(|step| step.row.row.pen);
+        let count = self.steps.range(self.safe..).take(LONGEST_REST).take_while(|step| step.is_at(&first)).count();
+        let steps = self.safe..self.safe + count;
+        let continues = self.last_safe.is_some_and(|last| last.is_at(&first));
         let before = self.last_safe.map_or(0, |step| step.row.row.pen);
-        let mut at_start_or_end = self.last_safe.is_none();
-        at_start_or_end |= self.ended && end == self.steps.len();
-        let is_pen_event = pens.clone().chain([before]).any(|pen| pen != first.row.row.pen);
-        let mut rest = None;
-        if is_pen_event && !at_start_or_end {
-            for step in self.steps.range_mut(self.safe..end) {
-                step.is_free = false;
-            }
-            rest = self.rest(self.safe..end);
-        }
-        let count = if is_pen_event { count } else { 1 };
+        let pens = self.steps.range(steps.clone()).map(|step| step.row.row.pen);
+        // The motors stand still while the pen moves.
+        let rests = continues || pens.chain([before]).any(|pen| pen != first.row.row.pen);
+        // The start pose is that of the nearest ticks, and a longer rest is not looked through.
+        let at_end = self.ended && steps.end == self.steps.len();
+        let is_whole = !continues && count < LONGEST_REST && self.last_safe.is_some() && !at_end;
+        let ticks = if rests && is_whole { self.rest(steps.clone()) } else { None };
+        let count = if rests { count } else { 1 };
         for index in self.safe..self.safe + count {
             let step = &mut self.steps[index];
-            step.safe = rest.unwrap_or(step.safe);
+            step.is_free &= !rests;
+            step.safe = ticks.unwrap_or(step.safe);
             let from = self.last_safe.map_or(step.safe, |last| last.safe);
             self.differences = self.differences.step(from, step.safe);
             step.bounds = self.bounds.or(&self.differences);
