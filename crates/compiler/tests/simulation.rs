@@ -11,7 +11,7 @@ use compiler::{import, report};
 use drawing::Drawing;
 use kinematics::Machine;
 use plan::Row;
-use planner::{PlacementOptions, TimingLaw};
+use planner::{PlacementOptions, Rounding, TimingLaw};
 use simulation::{
     AntiWindup, DcParameters, Drive, FeedForward, Feedback, MotorPlant, PidGains, SetpointKind,
     SimulationError,
@@ -24,7 +24,12 @@ struct Zot {
 }
 
 impl Zot {
+    /// Rounded to the nearest ticks, as the plan of the independent code.
     fn new() -> Self {
+        Self::rounded(Rounding::Nearest)
+    }
+
+    fn rounded(rounding: Rounding) -> Self {
         let machine = MachineFile::parse(PRESETS[0].toml).expect("a preset").machine().expect("a machine");
         let bytes = include_bytes!("../../../examples/zot.hpgl");
         let document = import::read(bytes, &import::Options::default()).expect("a drawing");
@@ -38,7 +43,7 @@ impl Zot {
             pen_colors: std::collections::BTreeMap::new(),
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::TimeOptimal,
-            rounding: planner::Rounding::Path,
+            rounding,
             allow_over_limit: false,
         };
         let compiled =
@@ -122,6 +127,10 @@ fn ideal_drives_draw_the_plan() {
     assert!(ink.stray.max_mm < 0.40 && ink.missed.max_mm < 0.40, "{ink:?}");
     assert!((ink.stray.rms_mm - 0.1124).abs() < 0.01, "{}", ink.stray.rms_mm);
     assert_eq!(ink.tails.count, 0);
+    let zot = Zot::rounded(Rounding::Path);
+    let ink = zot.simulate(&Drive::proportional(MotorPlant::Ideal, 0.0, 0.01)).unwrap().ink;
+    assert!(ink.stray.max_mm < 0.27 && ink.missed.max_mm < 0.27, "{ink:?}");
+    assert!((ink.stray.rms_mm - 0.0741).abs() < 0.005, "{}", ink.stray.rms_mm);
 }
 
 #[test]
