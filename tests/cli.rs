@@ -450,8 +450,7 @@ fn plans_for_every_machine() {
     }
     for machine in ["coaxial", "corexy"] {
         let command = format!("convert tiny.hpgl --machine {machine} --period 100ms --report json");
-        let said =
-            dir.succeed(&format!("{command} --rounding nearest --format csv --output plan.csv"));
+        let said = dir.succeed(&format!("{command} --rounding nearest --format csv --output plan.csv"));
         let report = said.err.lines().last().expect("a report on the last line");
         let plan = format!("{}\n\n{}", plan_summary(report), dir.text("plan.csv"));
         insta::assert_snapshot!(format!("plan_{machine}_nearest"), plan);

@@ -439,7 +439,7 @@ mod tests {
                 period_us: 10_000,
                 rows: rows as u64,
                 lift_overlap_us: 0,
-        rounding: plan::Rounding::Nearest,
+                rounding: plan::Rounding::Nearest,
                 pen_colors: std::collections::BTreeMap::new(),
                 duration_us: 10_000 * (rows as u64 - 1),
             },

@@ -37,17 +37,18 @@ fn picture() -> Result<String, Failure> {
          <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n\
          <clipPath id=\"panel\"><rect width=\"{SIDE}\" height=\"{SIDE}\"/></clipPath>\n"
     );
-    for (index, (rounding, title, color)) in [
-        (Rounding::Nearest, "nearest ticks", "#c8551b"),
-        (Rounding::Path, "along the path", "#1f4e9c"),
-    ]
-    .into_iter()
-    .enumerate()
+    for (index, (rounding, title, color)) in
+        [(Rounding::Nearest, "nearest ticks", "#c8551b"), (Rounding::Path, "along the path", "#1f4e9c")]
+            .into_iter()
+            .enumerate()
     {
         let settings = Settings { rounding, ..Settings::new(0.1, 10_000) };
         let rows: Vec<ExactRow> = plan(&machine, drawing.clone(), &settings)?.rows().collect();
         let x = 10.0 + (SIDE + 20.0) * index as f64;
-        writeln!(text, "<text x=\"{x}\" y=\"20\">{title}</text>\n<g transform=\"translate({x} 30)\" clip-path=\"url(#panel)\">")?;
+        writeln!(
+            text,
+            "<text x=\"{x}\" y=\"20\">{title}</text>\n<g transform=\"translate({x} 30)\" clip-path=\"url(#panel)\">"
+        )?;
         panel(&mut text, &machine, &rows, window, color)?;
         writeln!(text, "<rect width=\"{SIDE}\" height=\"{SIDE}\" fill=\"none\" stroke=\"#888888\"/>\n</g>")?;
     }

@@ -69,8 +69,8 @@ mod trajectory;
 mod travel;
 
 pub use error::PlanError;
-pub use plan::Rounding;
 pub use placement::{Mirror, PlacementOptions, Scale, Surface, beyond_sheet_mm, place};
+pub use plan::Rounding;
 pub use settings::{Settings, TimingLaw};
 pub use time_parametrization::{Easing, LimitingConstraints};
 pub use trajectory::{ExactRow, Rows, Times, Trajectory, check_reach, plan, plan_with_progress};

@@ -206,7 +206,9 @@ pub enum Violation {
         strokes: u64,
     },
     /// A row's ticks are not the rounded exact motor position.
-    #[error("motor {motor} is {by_ticks:.3} ticks from its exact position; rounding accounts for {allowed_ticks}")]
+    #[error(
+        "motor {motor} is {by_ticks:.3} ticks from its exact position; rounding accounts for {allowed_ticks}"
+    )]
     Drift {
         /// The motor.
         motor: String,

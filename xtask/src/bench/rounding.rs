@@ -141,7 +141,11 @@ fn figures(machine: &Machine, plan: &Trajectory<'_>) -> Figures {
         let count = rows[start..].iter().take_while(|row| row.row.pen == pen).count();
         if pen != 0 {
             let stroke = &rows[start..(start + count + 1).min(rows.len())];
-            let ink = followed(machine, &stroke.iter().map(|row| row.row.ticks.map(|t| t as f64)).collect::<Vec<_>>(), false);
+            let ink = followed(
+                machine,
+                &stroke.iter().map(|row| row.row.ticks.map(|t| t as f64)).collect::<Vec<_>>(),
+                false,
+            );
             let path = followed(machine, &stroke.iter().map(|row| row.exact).collect::<Vec<_>>(), true);
             ink_mm += weights(&ink).iter().sum::<f64>();
             path_mm += weights(&path).iter().sum::<f64>();
@@ -212,7 +216,8 @@ fn away(from: &Timed, line: &Timed) -> Vec<f64> {
             first += 1;
         }
         let chords = line[first..].windows(2).take_while(|chord| chord[0].1 <= row + WINDOW);
-        let distances = chords.map(|chord| drawing::distance_to_line(point, drawing::Line::new(chord[0].0, chord[1].0)));
+        let distances =
+            chords.map(|chord| drawing::distance_to_line(point, drawing::Line::new(chord[0].0, chord[1].0)));
         distances.fold(f64::INFINITY, f64::min).min(point.distance(line[first].0))
     };
     from.iter().map(nearest).collect()

@@ -58,7 +58,8 @@ impl Bounds {
 
     /// These bounds, or what `differences` need where that is more.
     pub(super) fn or(self, differences: &Differences) -> Self {
-        let more = |bound: Ticks, values: Ticks| [bound[0].max(values[0].abs()), bound[1].max(values[1].abs())];
+        let more =
+            |bound: Ticks, values: Ticks| [bound[0].max(values[0].abs()), bound[1].max(values[1].abs())];
         Self {
             first: more(self.first, differences.first),
             second: more(self.second, differences.second),

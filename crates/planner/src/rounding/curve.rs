@@ -113,11 +113,11 @@ impl Curve {
             (None, Some(before)) => 1.5 * step - 0.5 * before,
             (None, None) => step,
         };
-        let (linear, quadratic, cubic) =
-            (start, 3.0 * step - 2.0 * start - end, start + end - 2.0 * step);
+        let (linear, quadratic, cubic) = (start, 3.0 * step - 2.0 * start - end, start + end - 2.0 * step);
         for k in 1..=CHORDS {
             let t = f64::from(k) / f64::from(CHORDS);
-            let point = if k == CHORDS { to.point } else { from.point + t * (linear + t * (quadratic + t * cubic)) };
+            let point =
+                if k == CHORDS { to.point } else { from.point + t * (linear + t * (quadratic + t * cubic)) };
             self.length += (point - self.last).hypot2().sqrt();
             self.last = point;
             let since = self.length - self.vertices.last().map_or(0.0, |vertex| vertex.s);
@@ -201,7 +201,8 @@ impl Curve {
             let index = self.chord_at(s, chord);
             chord = index + self.removed;
             let vertex = &self.vertices[index];
-            let along = if vertex.length > 0.0 { ((s - vertex.s) / vertex.length).clamp(0.0, 1.0) } else { 0.0 };
+            let along =
+                if vertex.length > 0.0 { ((s - vertex.s) / vertex.length).clamp(0.0, 1.0) } else { 0.0 };
             let on_line = line[0] + share * (line[1] - line[0]);
             (on_line - (vertex.point + along * vertex.chord)).hypot2()
         })

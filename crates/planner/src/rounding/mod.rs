@@ -258,7 +258,8 @@ impl<'a> AlongPath<'a> {
     /// Makes the safe ticks and bounds of the next steps final: one step, or all steps of a rest.
     fn make_safe(&mut self) {
         let first = self.steps[self.safe];
-        let count = self.steps.range(self.safe..).take(LONGEST_REST).take_while(|step| step.is_at(&first)).count();
+        let count =
+            self.steps.range(self.safe..).take(LONGEST_REST).take_while(|step| step.is_at(&first)).count();
         let steps = self.safe..self.safe + count;
         let continues = self.last_safe.is_some_and(|last| last.is_at(&first));
         let before = self.last_safe.map_or(0, |step| step.row.row.pen);
@@ -329,7 +330,8 @@ impl<'a> AlongPath<'a> {
         for index in 0..3 {
             // After the last row the motors rest.
             let known = self.steps.get(index).filter(|_| index < self.safe);
-            next[index] = known.map_or(if index == 0 { step.safe } else { next[index - 1] }, |step| step.safe);
+            next[index] =
+                known.map_or(if index == 0 { step.safe } else { next[index - 1] }, |step| step.safe);
             bounds[index + 1] = known.map_or(self.bounds.or(&self.differences), |step| step.bounds);
         }
         let place = Place {

@@ -233,7 +233,8 @@ impl<'a> Plotter<'a> {
     }
 
     pub fn verify_as(&self, drawing: &Drawing, tolerance: f64, exact: bool) -> Certificate {
-        let timing = Timing { period_us: self.period_us, lift_overlap_us: 0, rounding: plan::Rounding::Nearest };
+        let timing =
+            Timing { period_us: self.period_us, lift_overlap_us: 0, rounding: plan::Rounding::Nearest };
         let mut verifier = Verifier::new(self.machine, drawing, timing, tolerance);
         for (index, row) in self.rows.iter().enumerate() {
             verifier.row(*row, exact.then(|| self.exact[index]));
