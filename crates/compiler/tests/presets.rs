@@ -71,6 +71,7 @@ fn plans_over_the_sheet_are_certified() {
             pen_colors: std::collections::BTreeMap::new(),
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::default(),
+            rounding: planner::Rounding::Path,
             allow_over_limit: false,
         };
         let compiled = compile(&drawing, &machine, &request, &|_| ());
