@@ -3,8 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use test_support::TestDir;
-use test_support::program::{Program, stderr, stdout};
+use test_support::{Program, TestDir, stderr, stdout};
 
 const PATH: &str = env!("CARGO_BIN_EXE_plotplan");
 const PLOTPLAN: Program = Program::new(PATH);
