@@ -425,3 +425,14 @@ fn machine_file_errors_give_the_line_of_the_value() {
         assert!(message.contains(&format!("line {line}: ")), "{message}");
     }
 }
+
+#[test]
+fn resuming_beyond_the_end_is_refused_before_the_port_is_opened() {
+    let dir = TestDir::new();
+    dir.write("a.hpgl", "IN;SP1;PU400,400;PD800,800;PU;PU0,0;PD400,0;PU;");
+    PROGRAM.succeed(&dir, "convert a.hpgl -m corexy -o plan.ticks");
+    let strokes = PROGRAM.refuse(&dir, "send a.hpgl --protocol hpgl --port no-port --from 99", 2);
+    assert!(strokes.contains("the drawing has 2 strokes: --from takes 0 to 2, not 99"), "{strokes}");
+    let rows = PROGRAM.refuse(&dir, "send plan.ticks --protocol ticks --port no-port --from 99999", 2);
+    assert!(rows.contains("the plan has rows 0 to"), "{rows}");
+}

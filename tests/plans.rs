@@ -123,7 +123,7 @@ fn verify_without_drawing_checks_motion() {
     let report: serde_json::Value = serde_json::from_str(said.text()).expect("one JSON object");
     assert_eq!(report["certificate"]["after_rounding"], serde_json::Value::Null);
     let info = dir.succeed("info plan.csv");
-    assert!(info.text().contains("pens     [1, 2], down 4 times\n"), "{}", info.text());
+    assert!(info.text().contains("pens     1, 2, 4 pen downs\n"), "{}", info.text());
 }
 
 /// A CSV plan with `by` added to one number.

@@ -133,7 +133,7 @@ pub enum ReadError {
         why: String,
     },
     /// A plan document is not JSON, or not of the right shape.
-    #[error("the plan document: {0}")]
+    #[error("the plan document is not JSON of its form")]
     Json(#[from] serde_json::Error),
     /// The columns of a plan document, or the rows in them, do not make a plan.
     #[error("the plan document's rows: {0}")]

@@ -32,9 +32,10 @@ pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
 fn list() -> String {
     let machines = machines::listed();
     let mut text = String::new();
+    let width = machines.iter().map(|machine| machine.name.chars().count()).max().unwrap_or(0).clamp(10, 20);
     for machine in &machines {
         let own = if machine.source == MachineSource::Own { "your own: " } else { "" };
-        let _ = write!(text, "{:<10} {own}{}", machine.name, machine.about);
+        let _ = write!(text, "{:<width$} {own}{}", machine.name, machine.about);
         if machine.hides_preset {
             text.push_str("; hides the preset of this name");
         }

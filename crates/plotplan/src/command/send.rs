@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use backends::pen_plotter::plotter::{Handshake, Plotter};
 use backends::{Backend, Outcome, PlanSource, Program, ProgramError, RowIter, Session, SessionOptions};
 use compiler::import;
+use compiler::report::text::pluralize;
 use compiler::report::{Code, SendEnd, SendReport, SendUnit};
 use plan::TickTable;
 use serialport::FlowControl;
@@ -38,11 +39,11 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
         Flow::Software => FlowControl::Software,
     };
     let settings = Settings { path: path.clone(), baud: arguments.baud, flow };
+    // A row that does not exist is no reason to open the port.
+    from_row(arguments, &program, None)?;
     let mut wire = Wire::open(settings, arguments.log.as_deref())?;
     let program = match (arguments.from, backend.status()) {
         (Some(row), Some(status)) => {
-            // A row that does not exist is no reason to ask the machine.
-            from_row(arguments, &program, None)?;
             let position = wire.query_position(status)?;
             let found = position.and_then(|position| program.row_at_position(row, position));
             if let Some(found) = found.filter(|found| *found != row) {
@@ -110,7 +111,16 @@ fn check_handshake(options: &SessionOptions) -> Result<(), Failure> {
 /// The program from the row where it is to begin.
 fn from_row(arguments: &Send, program: &Program, position: Option<[i64; 2]>) -> Result<Program, Failure> {
     let Some(row) = arguments.from else { return Ok(program.clone()) };
-    program.from_row(row, position).map_err(|error| Failure::Usage(error.into()))
+    program.from_row(row, position).map_err(|error| {
+        let is_strokes = arguments.protocol.0.row_name() == "stroke";
+        Failure::Usage(match error {
+            ProgramError::NoRow { row, last } if is_strokes => {
+                let strokes = pluralize(last as usize, "stroke");
+                anyhow::anyhow!("the drawing has {strokes}: --from takes 0 to {last}, not {row}")
+            }
+            error => error.into(),
+        })
+    })
 }
 
 /// What is sent: the lines of a plan, or those of a file in the machine's own language.
