@@ -89,9 +89,14 @@ fn placement_that_a_message_promises_works() {
 #[test]
 fn point_at_the_base_is_refused_with_one_message_that_makes_sense() {
     let dir = TestDir::new();
-    let zero = ARM.replace("elbow = \"left\"", "elbow = \"left\"\nmin_dexterity = 0");
-    dir.write("arm.toml", zero.replace("theta = { min = \"-185deg\", max = \"185deg\" }", ""));
+    let free = ARM.replace("theta = { min = \"-185deg\", max = \"185deg\" }", "");
+    let with =
+        |least: &str| free.replace("elbow = \"left\"", &format!("elbow = \"left\"\nmin_dexterity = {least}"));
     dir.write("cross.hpgl", "IN;SP1;PU1000,2000;PD3000,2000;PU;");
+    dir.write("arm.toml", with("0"));
+    let text = PROGRAM.refuse(&dir, "convert cross.hpgl -m arm.toml", 2);
+    assert!(text.contains("min_dexterity must be at least 0.001, not 0"), "{text}");
+    dir.write("arm.toml", with("0.001"));
     let text = PROGRAM.fail(&dir, "convert cross.hpgl -m arm.toml", 1);
     assert!(text.contains("the arm would have to fold completely"), "{text}");
     assert!(!text.contains("0.00 mm too near") && !text.contains("manipulability 0.000"), "{text}");
