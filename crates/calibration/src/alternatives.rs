@@ -31,9 +31,9 @@ pub fn alternatives(
     let mut found: Vec<(Alternative, f64)> = Vec::new();
     for reversed in [[true, false], [false, true], [true, true]] {
         let mut setup = nominal.clone();
-        for motor in 0..2 {
-            if reversed[motor] {
-                setup.ticks_per_unit[motor] = -setup.ticks_per_unit[motor];
+        for (ticks_per_unit, is_reversed) in setup.ticks_per_unit.iter_mut().zip(reversed) {
+            if is_reversed {
+                *ticks_per_unit = -*ticks_per_unit;
             }
         }
         found.extend(rms(&setup, data).map(|rms| (Alternative::Reversed(reversed), rms)));

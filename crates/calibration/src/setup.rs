@@ -156,7 +156,8 @@ impl Setup {
         self.geometry.iter().filter_map(|(key, value)| point((key, value))).collect()
     }
 
-    pub(crate) fn distance_of_points(&self) -> f64 {
+    /// Distance of the two bases or anchors, mm; 0 without.
+    pub fn distance_of_points(&self) -> f64 {
         match self.points()[..] {
             [(_, a), (_, b)] => (b - a).hypot2().sqrt(),
             _ => 0.0,
@@ -259,6 +260,14 @@ impl Setup {
     /// When the parameters do not make a machine.
     pub fn pen(&self, ticks: [f64; 2]) -> Result<Point, InvalidSetup> {
         Ok(self.model()?.pen(ticks))
+    }
+
+    /// The joints at these ticks, rad or mm.
+    ///
+    /// # Errors
+    /// When the parameters do not make a machine.
+    pub fn joints(&self, ticks: [f64; 2]) -> Result<[f64; 2], InvalidSetup> {
+        Ok(self.model()?.joints(ticks).0)
     }
 
     /// The ticks that hold the pen there, mm from the lower-left corner of the sheet, on the turn nearest to

@@ -91,6 +91,8 @@ pub(crate) enum Command {
     Simulate(Simulate),
     /// Find the gains of a machine's feedback loop, or its motor's parameters from a recorded step
     Tune(Tune),
+    /// Find a machine's start pose, lengths and counts from touched corners or measured marks
+    Calibrate(Calibrate),
     /// Send a plan to a machine
     Send(Send),
     /// Make the plans of a project, `plotplan.toml`, that are out of date
@@ -417,6 +419,61 @@ pub(crate) struct Tune {
     pub(crate) planning: Planning,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct Calibrate {
+    /// Machine: a preset's name or a machine file
+    #[arg(value_name = "MACHINE")]
+    pub(crate) machine: String,
+    /// Touches: rows of x_mm,y_mm,MOTOR1,MOTOR2[,elbow], where x and y are mm from the sheet's lower-left corner, and the
+    /// motors' columns are ticks while the pen is there
+    #[arg(value_name = "TOUCHES.csv", required_unless_present_any = ["drawn", "distances", "pattern"])]
+    pub(crate) touches: Option<String>,
+    /// The touches are the corners of this sheet, and have ticks only: lower left, lower right, upper right, upper left,
+    /// and again from the first for a second round
+    #[arg(long, value_name = "NAME|WxH", value_parser = compiler::paper::size_mm, requires = "touches")]
+    pub(crate) corners: Option<[f64; 2]>,
+    /// Marks of the pattern, measured with a ruler: rows of mark,x_mm,y_mm
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) drawn: Option<String>,
+    /// Distances between marks of the pattern: rows of mark,mark,distance_mm
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) distances: Option<String>,
+    /// Write the pattern of numbered crosses for this machine, as HP-GL, instead
+    #[arg(long, conflicts_with_all = ["touches", "drawn", "distances", "without", "free", "pointing"])]
+    pub(crate) pattern: bool,
+    /// Where to write the calibrated machine file, its comments kept, or the pattern; `-` for standard output [default: the
+    /// report only]
+    #[arg(short, long, value_name = "FILE", default_value = "", hide_default_value = true)]
+    pub(crate) output: String,
+    /// Standard deviation of a touch along x and along y
+    #[arg(long, value_name = "LENGTH", value_parser = length, default_value = "0.25mm")]
+    pub(crate) pointing: f64,
+    /// What may change: the pose (offsets and the place of the sheet), also lengths or counts, or all that the touches determine
+    #[arg(long, value_enum, default_value = "all")]
+    pub(crate) free: Free,
+    /// Leave these touches out, by their numbers
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    pub(crate) without: Vec<usize>,
+}
+
+impl Calibrate {
+    /// Whether nothing is written.
+    pub(crate) fn report_only(&self) -> bool {
+        self.output.is_empty()
+    }
+}
+
+/// Unknowns of a calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Free {
+    /// Offsets of the motors and the place of the sheet
+    Pose,
+    /// Also link lengths, or counts
+    Lengths,
+    /// All that the touches determine
+    All,
+}
+
 /// How a plan becomes setpoints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Setpoints {
@@ -595,13 +652,14 @@ impl Command {
             Self::Man(_) => "man",
             Self::Simulate(_) => "simulate",
             Self::Tune(_) => "tune",
+            Self::Calibrate(_) => "calibrate",
         }
     }
 }
 
 /// Whether standard output holds the report itself, so that its JSON form goes there.
 pub(crate) fn reports_on_stdout(command: &str) -> bool {
-    ["check", "info", "verify", "diff", "simulate", "tune", "machine check", "machine list"]
+    ["check", "info", "verify", "diff", "simulate", "tune", "calibrate", "machine check", "machine list"]
         .contains(&command)
 }
 

@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod build;
+mod calibrate;
 mod check;
 mod convert;
 mod diff;
@@ -40,6 +41,7 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Preview(preview) => preview::run(preview),
         Command::Simulate(simulate) => simulate::run(simulate),
         Command::Tune(tune) => tune::run(tune),
+        Command::Calibrate(calibrate) => calibrate::run(calibrate),
         Command::Send(send) => send::run(send),
         Command::Build(build) => build::run(build),
         Command::Init(init) => build::init(init),

@@ -353,6 +353,8 @@ mod tests {
         row(&["plotplan", "tune", "-mcoaxial"]);
         row(&["plotplan", "tune", "-mcoaxial", "-dx.hpgl"]);
         row(&["plotplan", "tune", "--from-step", "x.csv"]);
+        row(&["plotplan", "calibrate", "coaxial", "x.csv"]);
+        row(&["plotplan", "calibrate", "coaxial", "--pattern"]);
         row(&["plotplan", "verify", "x.csv"]);
         row(&["plotplan", "verify", "x.csv", "-dx.hpgl"]);
         insta::assert_snapshot!(table);

@@ -316,6 +316,23 @@ impl MachineFile {
         Ok(start)
     }
 
+    /// The parameters of the mechanism, for calibration.
+    pub fn geometry_parameters(&self) -> BTreeMap<String, calibration::Parameter> {
+        let length = |text: &str| quantity::length_mm(text, false).ok();
+        let parameter = |value: &Parameter| match value {
+            Parameter::Number(_) => None,
+            Parameter::Text(text) => Some(match length(text) {
+                Some(mm) => calibration::Parameter::Length(mm),
+                None => calibration::Parameter::Choice(text.clone()),
+            }),
+            Parameter::Point([x, y]) => {
+                Some(calibration::Parameter::Point(Point::new(length(x)?, length(y)?)))
+            }
+        };
+        let of_mechanism = self.geometry.table.iter().filter(|(key, _)| *key != "kind");
+        of_mechanism.filter_map(|(key, value)| Some((key.clone(), parameter(value)?))).collect()
+    }
+
     /// The drive of the machine, for simulations; `None` for a file without `[drive]`.
     ///
     /// # Errors

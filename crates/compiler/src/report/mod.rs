@@ -4,6 +4,7 @@
 //! and the JSON schema are generated from the types of this module; see [`page`].
 
 mod build;
+pub mod calibration;
 mod certificate;
 mod diff;
 mod input;
@@ -84,6 +85,8 @@ pub struct Report {
     pub tuning: Option<tuning::TuningReport>,
     /// The parameters of a motor, from `tune --from-step`.
     pub motor: Option<tuning::MotorEstimates>,
+    /// What was found, from `calibrate`.
+    pub calibration: Option<calibration::CalibrationReport>,
     /// What was sent, from `send`.
     pub sending: Option<SendReport>,
     /// What changed, from `diff`.

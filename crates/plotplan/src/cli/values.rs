@@ -61,7 +61,10 @@ pub(super) fn distance(text: &str) -> Result<f64, String> {
 
 /// A number of processes.
 pub(super) fn jobs(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|jobs| (1..=1024).contains(jobs)).ok_or_else(|| "expected a number from 1".to_owned())
+    text.parse()
+        .ok()
+        .filter(|jobs| (1..=1024).contains(jobs))
+        .ok_or_else(|| "expected a number from 1".to_owned())
 }
 
 /// Spacing of a hatch, and its angle after a comma.
