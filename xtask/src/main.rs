@@ -5,6 +5,7 @@
 use std::process::ExitCode;
 
 mod bench;
+mod bound;
 mod ci;
 mod corpus;
 mod firmware;
@@ -30,6 +31,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   web-test [PROGRAM] [--write]
                 test animated previews in a browser, written by PROGRAM or the release build; installs
                 Node.js, Chromium and npm packages if missing; --write makes new reference screenshots
+  bound [PYTHON] [--all]
+                the fastest motion within the tolerance for a set of strokes, with casadi, which is
+                installed below target/; computes what the table of the planner's tests lacks
   bench order GENERATOR
                 order the drawings of the script GENERATOR (python3 with numpy); compare with
                 reference solutions
@@ -52,6 +56,10 @@ fn main() -> ExitCode {
         ["ci", ref steps @ ..] => ci::run_steps(steps),
         ["tidy"] => tidy::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
+        ["bound"] => bound::run("python3", false),
+        ["bound", "--all"] => bound::run("python3", true),
+        ["bound", python] => bound::run(python, false),
+        ["bound", python, "--all"] => bound::run(python, true),
         ["bench", "order", generator] => order::bench(generator.as_ref()),
         ["firmware", ref filters @ ..] => firmware::run(filters),
         ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),

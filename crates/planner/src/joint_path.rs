@@ -1,10 +1,11 @@
 //! Joint paths: inverse kinematics along a section, on an adaptive grid, with the derivatives that
 //! time parametrization needs.
 
-use drawing::{Point, Segment, Vec2};
+use drawing::{Point, Segment};
 use kinematics::{Fault, JointKind, JointPos, Machine, MotorPos, OutOfReach, Unreachable};
 
 use crate::path::{Piece, Section};
+use crate::time_parametrization::hermite;
 
 /// A path in joint space that can be followed without stopping.
 ///
@@ -45,6 +46,8 @@ pub struct GridInterval {
     pub second: [MotorPos; 3],
     /// Largest |dp/ds| of the pen.
     pub pen_speed: f64,
+    /// |dp/ds|² at its start, middle and end, and its derivative.
+    pub square_pen_speeds: [[f64; 2]; 3],
     /// Bound on the second derivative of the pen's path relative to linear joint motion, 1/mm: with
     /// rows `T` apart, motion at constant speed leaves the path by at most `(ds/dt)² T²
     /// second_derivative_bound / 8`.
@@ -55,6 +58,9 @@ pub struct GridInterval {
     /// a share of the limits; 0 where they are linear in `s` (lines and parabolas on linear
     /// kinematics).
     pub interpolation_error: f64,
+    /// The same for polynomials of degree 5 with the derivatives of these samples; 0 on linear
+    /// kinematics except for arcs.
+    pub polynomial_error: f64,
 }
 
 /// Largest rotation of a joint over an interval, rad, so that no extremum of a derivative lies
@@ -64,6 +70,13 @@ const LARGEST_TURN: f64 = 0.15;
 /// Largest deviation of the derivatives in the middle of an interval from the mean of its ends, as
 /// a share of the constraint that limits the speed.
 const LARGEST_MIDPOINT_ERROR: f64 = 0.02;
+
+/// The same on linear kinematics without jerk limits, where the derivatives are polynomials: only so
+/// that the time parametrization finds their extrema.
+const LARGEST_POLYNOMIAL_CHANGE: f64 = 0.25;
+
+/// Largest [`GridInterval::polynomial_error`] for the time parametrization.
+const LARGEST_POLYNOMIAL_ERROR: f64 = 1e-4;
 
 /// Shortest interval, mm.
 const SHORTEST: f64 = 1e-5;
@@ -77,6 +90,8 @@ pub(crate) struct PathDerivatives {
     pub(crate) second: MotorPos,
     /// See [`GridInterval::pen_speed`].
     pub(crate) pen_speed: f64,
+    /// Its square, and the derivative of that.
+    square_pen_speed: [f64; 2],
     /// The component of p'' normal to the path, `|p' x p''| / |p'|` = curvature times |p'|², 1/mm.
     normal_second_derivative: f64,
     /// See [`GridInterval::second_derivative_bound`].
@@ -108,9 +123,11 @@ impl JointPath {
                 first: [change; 3],
                 second: [MotorPos::ZERO; 3],
                 pen_speed,
+                square_pen_speeds: [[pen_speed * pen_speed, 0.0]; 3],
                 second_derivative_bound: 0.0,
                 near_corner: false,
                 interpolation_error: 0.0,
+                polynomial_error: 0.0,
             }],
         })
     }
@@ -142,17 +159,24 @@ impl JointPath {
     }
 }
 
+impl JointPath {
+    /// Whether it is one line of the pen.
+    pub(crate) fn is_line(&self) -> bool {
+        match &self.geometry {
+            PathGeometry::Drawn(_, section) => {
+                matches!(section[..], [Piece { curve: Segment::Line(_), .. }])
+            }
+            PathGeometry::Travel(..) => false,
+        }
+    }
+}
+
 impl GridInterval {
-    /// Appends the interval, bisected `times` times.
-    pub(crate) fn subdivide(
-        &self,
-        machine: &Machine,
-        geometry: &PathGeometry,
-        times: u32,
-        to: &mut Vec<Self>,
-    ) {
-        match if times > 0 { self.halves(machine, geometry) } else { None } {
-            Some(halves) => halves.iter().for_each(|half| half.subdivide(machine, geometry, times - 1, to)),
+    /// Appends the interval, bisected until polynomials of degree 5 are accurate enough.
+    pub(crate) fn refine(&self, machine: &Machine, geometry: &PathGeometry, to: &mut Vec<Self>) {
+        let wanted = self.polynomial_error > LARGEST_POLYNOMIAL_ERROR;
+        match if wanted { self.halves(machine, geometry) } else { None } {
+            Some(halves) => halves.iter().for_each(|half| half.refine(machine, geometry, to)),
             None => to.push(*self),
         }
     }
@@ -169,39 +193,25 @@ impl GridInterval {
             let t = ((self.start + share * self.length) * piece.rate).min(1.0);
             // Derivatives do not depend on the turn about the base.
             let pose = machine.mechanism().inverse(piece.curve.eval(t)).ok()?;
-            let (first, second) = motor_derivatives(machine, piece, t, &pose);
-            Some((first, second))
+            let of = PathDerivatives::of(machine, piece, t, &pose);
+            Some((of.first, of.second, of.square_pen_speed))
         };
-        let known = |k: usize| (self.first[k], self.second[k]);
+        let known = |k: usize| (self.first[k], self.second[k], self.square_pen_speeds[k]);
         let places = [known(0), at(0.25)?, known(1), at(0.75)?, known(2)];
-        let parts = [0, 2].map(|from| {
-            let places = [places[from], places[from + 1], places[from + 2]];
-            (places.map(|place| place.0), places.map(|place| place.1))
-        });
-        // The maximum over both halves: a half in which the third derivative changes sign shows no
-        // midpoint error.
-        let midpoint_errors =
-            parts.map(|(first, second)| midpoint_error(machine, self.pen_speed, &first, &second));
-        let interpolation_error = 0.5 * midpoint_errors[0].max(midpoint_errors[1]);
         let half = |which: usize| {
-            let (first, second) = parts[which];
+            let places = [places[2 * which], places[2 * which + 1], places[2 * which + 2]];
             Self {
                 length: 0.5 * self.length,
                 start: self.start + 0.5 * which as f64 * self.length,
-                interpolation_error,
-                first,
-                second,
-                // Bounds over the interval hold for its halves.
+                first: places.map(|place| place.0),
+                second: places.map(|place| place.1),
+                square_pen_speeds: places.map(|place| place.2),
+                // Of order 6, so it decreases by 64; bounds over the interval hold for its halves.
+                polynomial_error: self.polynomial_error / 32.0,
                 ..*self
             }
         };
         Some([half(0), half(1)])
-    }
-
-    /// Whether the motor positions are linear in `s`, so that constant acceleration along the path
-    /// is constant in the motors.
-    pub(crate) fn is_straight(&self) -> bool {
-        self.second.iter().all(|second| *second == MotorPos::ZERO)
     }
 }
 
@@ -295,7 +305,7 @@ impl Builder<'_> {
                 &second,
             );
             if length > SHORTEST
-                && (midpoint_error > LARGEST_MIDPOINT_ERROR
+                && (midpoint_error > self.largest_midpoint_error(piece)
                     || !self.is_within_limits(length, &a, &middle, &b))
             {
                 pending.push((middle, b));
@@ -310,6 +320,12 @@ impl Builder<'_> {
                     fault: Fault::Singular { manipulability: 0.0, min },
                 });
             }
+            let (interpolation_error, polynomial_error) = if self.is_polynomial(piece) {
+                // Of a parabola between the samples: a quarter of that between the ends.
+                (0.3 * midpoint_error, 0.0)
+            } else {
+                self.errors(piece, &a, &middle, &b)?
+            };
             let samples = [&a.derivatives, &middle.derivatives, &b.derivatives];
             let most =
                 |of: fn(&PathDerivatives) -> f64| samples.iter().map(|rates| of(rates)).fold(0.0, f64::max);
@@ -320,40 +336,67 @@ impl Builder<'_> {
                 first,
                 second,
                 pen_speed: most(|rates| rates.pen_speed),
+                square_pen_speeds: samples.map(|rates| rates.square_pen_speed),
                 second_derivative_bound: most(|rates| rates.second_derivative_bound),
                 near_corner: piece.near_corner,
-                interpolation_error: self.interpolation_error(piece, &a, &middle, &b)?,
+                interpolation_error,
+                polynomial_error,
             });
         }
         Ok(())
     }
 
-    /// Bound on the error of linear interpolation between the three samples, from samples in
-    /// between.
-    fn interpolation_error(
+    /// Whether the motors' derivatives are polynomials.
+    fn is_polynomial(&self, piece: &Piece) -> bool {
+        self.machine.mechanism().is_linear() && !matches!(piece.curve, Segment::Arc(_))
+    }
+
+    fn largest_midpoint_error(&self, piece: &Piece) -> f64 {
+        let jerk = self.machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some());
+        if self.is_polynomial(piece) && !jerk { LARGEST_POLYNOMIAL_CHANGE } else { LARGEST_MIDPOINT_ERROR }
+    }
+
+    /// Bounds on the errors of linear interpolation between the three samples and of polynomials
+    /// through them, from samples in between.
+    fn errors(
         &self,
         piece: &Piece,
         a: &Sample,
         middle: &Sample,
         b: &Sample,
-    ) -> Result<f64, OutOfReach> {
-        let even = self.machine.mechanism().is_linear();
-        if even && piece.curve.third_derivative(0.0) == Vec2::ZERO {
-            return Ok(0.0);
-        }
-        let mut interpolation_error = 0.0_f64;
-        for (from, to) in [(a, middle), (middle, b)] {
+    ) -> Result<(f64, f64), OutOfReach> {
+        let (mut interpolation_error, mut polynomial_error) = (0.0_f64, 0.0_f64);
+        let samples = [&a.derivatives, &middle.derivatives, &b.derivatives];
+        let (first, second) = (samples.map(|of| of.first), samples.map(|of| of.second));
+        let length = b.s - a.s;
+        for (share, [from, to]) in [(0.25, [a, middle]), (0.75, [middle, b])] {
             let half_way = self.sample(piece, 0.5 * (from.s + to.s), from.pose)?.derivatives;
-            let first = [from.derivatives.first, half_way.first, to.derivatives.first];
-            let second = [from.derivatives.second, half_way.second, to.derivatives.second];
-            interpolation_error = interpolation_error.max(midpoint_error(
+            let pen_speed = from.derivatives.pen_speed.max(to.derivatives.pen_speed);
+            let (first_there, second_there) = (
+                [from.derivatives.first, half_way.first, to.derivatives.first],
+                [from.derivatives.second, half_way.second, to.derivatives.second],
+            );
+            interpolation_error =
+                interpolation_error.max(midpoint_error(self.machine, pen_speed, &first_there, &second_there));
+            // As if the polynomial's values were the mean of two ends.
+            let predicted = [0, 1].map(|k| {
+                let c = hermite(length, first.map(|m| m[k]), second.map(|m| m[k]));
+                let value = c.iter().rev().fold(0.0, |sum, c| sum * share + c);
+                let slope = (1..6).rev().fold(0.0, |sum, j| sum * share + j as f64 * c[j]);
+                (value, slope / length)
+            });
+            let of = |pick: fn(&(f64, f64)) -> f64| MotorPos::new(pick(&predicted[0]), pick(&predicted[1]));
+            let (value, slope) = (of(|p| p.0), of(|p| p.1));
+            let error = midpoint_error(
                 self.machine,
-                from.derivatives.pen_speed.max(to.derivatives.pen_speed),
-                &first,
-                &second,
-            ));
+                pen_speed,
+                &[value, half_way.first, value],
+                &[slope, half_way.second, slope],
+            );
+            polynomial_error = polynomial_error.max(error);
         }
-        Ok(1.2 * interpolation_error)
+        // Twice: the acceleration along the path may be that of a motor at its other limit.
+        Ok((1.2 * interpolation_error, 2.0 * polynomial_error))
     }
 
     /// The largest rotation of a joint between two samples, rad.
@@ -417,14 +460,7 @@ pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f
     fastest + 0.5 * (0..PARTS).map(part).fold(0.0, f64::max) * f64::from(PARTS)
 }
 
-/// First and second derivatives of the motors with respect to `s`, at the piece's own parameter
-/// `t`.
-fn motor_derivatives(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> (MotorPos, MotorPos) {
-    let (velocity, acceleration) = piece.curve.derivatives(t);
-    machine.motor_derivatives(pose, piece.rate * velocity, piece.rate * piece.rate * acceleration)
-}
-
-/// Third derivatives, likewise.
+/// Third derivatives of the motors with respect to `s`, at the piece's own parameter `t`.
 pub(crate) fn third_derivative(machine: &Machine, piece: &Piece, t: f64, pose: &JointPos) -> MotorPos {
     let rate = piece.rate;
     let (first, second) = piece.curve.derivatives(t);
@@ -453,7 +489,8 @@ impl PathDerivatives {
             (_, None) => acceleration.hypot2().sqrt(),
         };
         let second_derivative_bound = bending + geometry.second_derivative_bound(pose, &(*pose + rates));
-        Self { first, second, pen_speed, normal_second_derivative, second_derivative_bound }
+        let square_pen_speed = [velocity.hypot2(), 2.0 * velocity.dot(acceleration)];
+        Self { first, second, pen_speed, square_pen_speed, normal_second_derivative, second_derivative_bound }
     }
 }
 

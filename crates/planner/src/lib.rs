@@ -83,5 +83,5 @@ pub mod unstable {
     pub use crate::joint_path::{GridInterval, JointPath, PathGeometry};
     pub use crate::path::{Aim, Limits, fitted};
     pub use crate::path::{CornerBlend, PathBudget, Piece, Section, sections};
-    pub use crate::time_parametrization::{Phase, Profile, SpeedCap, profile, profile_without_refinement};
+    pub use crate::time_parametrization::{Phase, Profile, SpeedCap, profile, profile_on_grid};
 }

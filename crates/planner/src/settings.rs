@@ -26,6 +26,9 @@ pub struct Settings {
     pub timing_law: TimingLaw,
     /// How rows take whole ticks.
     pub rounding: Rounding,
+    /// Whether path and speed of splines are optimized together; otherwise they are the smoothest
+    /// splines within the tolerance, which takes a third of the time to compute.
+    pub joint_fit: bool,
 }
 
 /// The timing law along strokes.
@@ -56,6 +59,7 @@ impl Settings {
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::TimeOptimal,
             rounding: Rounding::Path,
+            joint_fit: true,
         }
     }
 
@@ -93,6 +97,8 @@ pub(crate) struct ToleranceBudget {
     pub(crate) spline_mm: Option<f64>,
     /// What that spline aims at.
     pub(crate) aim: Aim,
+    /// The largest acceleration of the pen that the motors can produce, mm/s².
+    pub(crate) acceleration_mm_s2: f64,
 }
 
 impl ToleranceBudget {
@@ -130,7 +136,8 @@ impl ToleranceBudget {
         Self {
             row_mm: row,
             spline_mm: (jerk || has_at_most(drawing, MAX_SPLINE_SEGMENTS)).then_some(path),
-            aim: aim(machine),
+            aim: if settings.joint_fit { aim(machine) } else { Aim::Smoothest },
+            acceleration_mm_s2: acceleration,
             path: PathBudget {
                 chord_mm: 0.5 * path,
                 simplify_mm: simplify,

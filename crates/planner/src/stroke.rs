@@ -6,9 +6,11 @@ use kinematics::{Fault, JointPos, Machine, OutOfReach, Unreachable};
 use crate::{
     error::PlanError,
     joint_path::{JointPath, PathGeometry},
-    path::{Limits, PathBudget, Piece, Section, bound_speed, fitted, sections, vertex_to_vertex},
+    path::{
+        Limits, PathBudget, Piece, Section, bound_speed, fitted, sections, shortest_length, vertex_to_vertex,
+    },
     settings::{Settings, TimingLaw, ToleranceBudget},
-    time_parametrization::{Profile, SpeedCap, fixed_duration, profile, rough_duration},
+    time_parametrization::{Profile, SpeedCap, fixed_duration, profile, without_jerk},
     travel::waypoints,
 };
 
@@ -30,12 +32,17 @@ pub(crate) struct PlannedStroke {
     pub(crate) start: JointPos,
     /// Empty for a dot.
     pub(crate) motions: Vec<PathMotion>,
+    /// Whether its corners are blended one by one: no spline is faster.
+    pub(crate) has_blends: bool,
 }
 
 /// Joint paths, and the pose at the end of each.
 type Lifted = Vec<(JointPath, JointPos)>;
 
-/// Ratios of rough durations that decide between two ways to draw a stroke.
+/// A spline is not tried where it could save at most this share of a stroke's time.
+const LEAST_GAIN: f64 = 2e-3;
+
+/// Ratios of durations without jerk limits that decide between two ways to draw a stroke.
 const CLEARLY_FASTER: f64 = 0.92;
 const CLEARLY_SLOWER: f64 = 1.08;
 
@@ -47,7 +54,12 @@ impl PlannedStroke {
     /// Periods, and seconds where those are equal.
     fn duration_key(&self) -> (u64, f64) {
         let periods = self.motions.iter().map(|motion| motion.periods).sum();
-        (periods, self.motions.iter().map(|motion| motion.profile.duration_s).sum())
+        (periods, self.duration_s())
+    }
+
+    /// Without rounding to periods.
+    fn duration_s(&self) -> f64 {
+        self.motions.iter().map(|motion| motion.profile.duration_s).sum()
     }
 }
 
@@ -123,10 +135,13 @@ impl StrokePlanner<'_> {
                 let blended = self
                     .lift(stroke, pose, sections(stroke, &self.budget.path))
                     .or_else(|_| self.lift(stroke, pose, sections(stroke, &exact)))?;
-                Ok(match self.spline(stroke, pose) {
-                    Some(spline) => self.faster(stroke, pose, blended, spline),
-                    None => self.planned(stroke, pose, blended),
-                })
+                let is_line = blended.len() < 2 && blended.iter().all(|(path, _)| path.is_line());
+                let planned = if is_line {
+                    self.planned(stroke, pose, blended)
+                } else {
+                    self.faster(stroke, pose, blended)
+                };
+                Ok(planned)
             }
             TimingLaw::Trapezoid | TimingLaw::FixedDuration { .. } => {
                 let paths = self.lift(stroke, pose, vertex_to_vertex(stroke, &exact))?;
@@ -160,35 +175,68 @@ impl StrokePlanner<'_> {
         self.lift(stroke, start, vec![section]).ok()
     }
 
-    /// The motion along the faster one of two ways to draw a stroke.
-    ///
-    /// The duration on the path's own grid, without refinement and without jerk limits, is within
-    /// 8 % of the final one and takes a twentieth of the time to compute. Where it does not decide,
-    /// both motions are computed; and always where rows limit the speed near corners, which those
-    /// grids resolve poorly.
-    fn faster(&self, stroke: &Stroke, start: JointPos, blended: Lifted, spline: Lifted) -> PlannedStroke {
+    /// The motion along the spline or along the blended corners, whichever is faster.
+    fn faster(&self, stroke: &Stroke, start: JointPos, blended: Lifted) -> PlannedStroke {
+        if self.has_jerk() {
+            return self.faster_under_jerk(stroke, start, blended);
+        }
+        let blends = PlannedStroke { has_blends: true, ..self.planned(stroke, start, blended) };
+        if self.gains_nothing(stroke, blends.duration_s()) {
+            return blends;
+        }
+        match self.spline(stroke, start).map(|spline| self.planned(stroke, start, spline)) {
+            Some(spline) if spline.duration_key() < blends.duration_key() => spline,
+            _ => blends,
+        }
+    }
+
+    /// The same under jerk limits, where profiles take longer to compute: the durations without
+    /// these limits decide, unless they are nearly the same, or rows limit the speed near corners.
+    fn faster_under_jerk(&self, stroke: &Stroke, start: JointPos, blended: Lifted) -> PlannedStroke {
+        let blends = |blended| PlannedStroke { has_blends: true, ..self.planned(stroke, start, blended) };
+        let Some(spline) = self.spline(stroke, start) else { return blends(blended) };
         if !self.budget.path.row_mm.is_finite() {
             let cap = self.cap(self.settings.speed_of(self.machine, stroke.pen));
             let rough = |paths: &Lifted| {
-                paths.iter().map(|(path, _)| rough_duration(self.machine, path, &cap)).sum::<f64>()
+                paths.iter().map(|(path, _)| without_jerk(self.machine, path, &cap).duration_s).sum::<f64>()
             };
             let ratio = rough(&spline) / rough(&blended);
             if ratio < CLEARLY_FASTER {
                 return self.planned(stroke, start, spline);
             }
             if ratio > CLEARLY_SLOWER {
-                return self.planned(stroke, start, blended);
+                return blends(blended);
             }
         }
-        let (blended, spline) = (self.planned(stroke, start, blended), self.planned(stroke, start, spline));
-        if spline.duration_key() < blended.duration_key() { spline } else { blended }
+        let (blends, spline) = (blends(blended), self.planned(stroke, start, spline));
+        if spline.duration_key() < blends.duration_key() { spline } else { blends }
+    }
+
+    fn has_jerk(&self) -> bool {
+        self.machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some())
+    }
+
+    /// Whether a stroke drawn in `duration_s` is about as fast as a line of its length would be: on
+    /// long gentle curves the pen's own limit is reached with any path.
+    fn gains_nothing(&self, stroke: &Stroke, duration_s: f64) -> bool {
+        let Some(tolerance) = self.budget.spline_mm else { return true };
+        let speed = self.settings.speed_of(self.machine, stroke.pen);
+        let acceleration = self.budget.acceleration_mm_s2;
+        let length = shortest_length(stroke, tolerance);
+        // From rest to rest.
+        let least = if length * acceleration > speed * speed {
+            length / speed + speed / acceleration
+        } else {
+            2.0 * (length / acceleration).sqrt()
+        };
+        duration_s <= (1.0 + LEAST_GAIN) * least
     }
 
     /// The fastest motion along the paths of a stroke.
     fn planned(&self, stroke: &Stroke, start: JointPos, paths: Lifted) -> PlannedStroke {
         let speed = self.settings.speed_of(self.machine, stroke.pen);
         let motions = paths.into_iter().map(|(path, end)| self.parametrize(path, end, speed)).collect();
-        PlannedStroke { start, motions }
+        PlannedStroke { start, motions, has_blends: false }
     }
 
     /// The pose at the end of a path, with angles unwrapped along its intervals.

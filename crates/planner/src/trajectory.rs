@@ -69,6 +69,7 @@ pub struct Trajectory<'a> {
     rows: u64,
     times: Times,
     limiting: LimitingConstraints,
+    blended_strokes: usize,
 }
 
 /// How the duration of a plan is divided, s.
@@ -168,6 +169,7 @@ pub fn plan_with_progress<'a>(
         rows: 1,
         times: Times::default(),
         limiting: LimitingConstraints::default(),
+        blended_strokes: 0,
     };
     let period = settings.period_us as f64 * 1e-6;
     let (mut periods, mut rows, mut times, mut limiting) =
@@ -204,7 +206,8 @@ pub fn plan_with_progress<'a>(
             cached.push(motion);
         }
     }
-    Ok(Trajectory { cached, periods, rows, times, limiting, ..trajectory })
+    let blended_strokes = motions.blended_strokes;
+    Ok(Trajectory { cached, periods, rows, times, limiting, blended_strokes, ..trajectory })
 }
 
 /// Checks that the machine can reach every stroke, in the drawing's order.
@@ -240,6 +243,12 @@ impl Trajectory<'_> {
     /// For how long of the drawing time each constraint was active.
     pub fn limiting(&self) -> LimitingConstraints {
         self.limiting
+    }
+
+    /// The number of strokes of more than one line whose corners are blended one by one, because no
+    /// spline within the tolerance and the reach is faster.
+    pub fn blended_strokes(&self) -> usize {
+        self.blended_strokes
     }
 
     /// The duration, microseconds.
@@ -296,6 +305,7 @@ impl Trajectory<'_> {
             queue: VecDeque::new(),
             is_down: false,
             finished: false,
+            blended_strokes: 0,
         }
     }
 }
@@ -318,6 +328,8 @@ struct Motions<'a> {
     is_down: bool,
     /// Whether the travel back to the start pose is queued.
     finished: bool,
+    /// The number of strokes so far that keep blends.
+    blended_strokes: usize,
 }
 
 impl Motions<'_> {
@@ -347,6 +359,7 @@ impl Motions<'_> {
         let planned = self.planner.plan(stroke, &self.pose, candidate).map_err(|source| {
             PlanError::OutOfReach { stroke: index, pen: stroke.pen, span: stroke.source(), source }
         })?;
+        self.blended_strokes += usize::from(planned.has_blends);
         self.travel(planned.start)?;
         if index == 0 && self.queue.is_empty() {
             // The first stroke starts at the start pose: the plan still starts with the pen up.

@@ -6,6 +6,7 @@
 //! integration tests can.
 #![allow(clippy::missing_panics_doc, reason = "helpers of tests panic where a test must fail")]
 
+pub mod band;
 mod dir;
 pub mod machines;
 pub mod mechanisms;

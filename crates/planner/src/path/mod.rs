@@ -61,6 +61,11 @@ pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
         .collect()
 }
 
+/// About the length of the shortest path within `tolerance` mm of a stroke, mm.
+pub(crate) fn shortest_length(stroke: &Stroke, tolerance: f64) -> f64 {
+    simplify::simplify(clean(stroke, tolerance), tolerance).iter().map(Segment::length).sum()
+}
+
 /// Every piece of a stroke as a section of its own: the pen stops at every vertex, except between
 /// collinear lines.
 pub(crate) fn vertex_to_vertex(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {

@@ -120,30 +120,6 @@ impl IntervalConstraints {
         (b + self.two_h * u).clamp(0.0, top)
     }
 
-    /// How far the motors stay below their limits over the interval with one acceleration, as a
-    /// share of the limits; 0 if bisecting it would gain nothing.
-    pub(super) fn unused_capacity(&self, b0: f64, b1: f64) -> f64 {
-        if self.is_straight() {
-            return 0.0;
-        }
-        let of = |share: f64, at: usize| {
-            let b = b0 + share * (b1 - b0);
-            1.0 - self.active_constraint(b0, b1, &[at, 3 + at, 6, 7]).1.max(b / self.cap)
-        };
-        (of(0.0, 0) + of(0.5, 1) + of(1.0, 2)) / 3.0
-    }
-
-    /// Whether a motor near its limit is limited by b rather than by u: near a zero-inertia point,
-    /// where its m' vanishes, a larger b at the start of an interval allows only a smaller b at its
-    /// end, so maximizing the speed up to that point is not optimal. With `b1 = b + two_h (1 - r b)
-    /// / p` this starts at `two_h r = p`; the shorter the intervals, the narrower that region.
-    pub(super) fn is_near_zero_inertia_point(&self, b0: f64, b1: f64) -> bool {
-        let u = (b1 - b0) / self.two_h;
-        self.strips[..6].iter().any(|strip| {
-            self.two_h * strip.r.abs() > 0.5 * strip.p && (strip.p * u + strip.r * b0).abs() > 0.5
-        })
-    }
-
     /// The strip with the largest utilization from b0 to b1, and its utilization.
     fn active_constraint(&self, b0: f64, b1: f64, strips: &[usize]) -> (usize, f64) {
         let u = (b1 - b0) / self.two_h;
@@ -156,18 +132,6 @@ impl IntervalConstraints {
 
     fn is_straight(&self) -> bool {
         self.strips.iter().all(|strip| strip.r == 0.0)
-    }
-
-    /// The duration from b0 to b1, s; infinite from rest to rest where no peak is possible.
-    pub(super) fn time(&self, b0: f64, b1: f64) -> f64 {
-        let length = 0.5 * self.two_h;
-        let over = |length: f64, a: f64, b: f64| 2.0 * length / (a.sqrt() + b.sqrt());
-        match self.speed_shape(b0, b1) {
-            SpeedShape::Ramp => over(length, b0, b1),
-            SpeedShape::Peak { b, up, down } => {
-                over(up, b0, b) + (length - up - down) / b.sqrt() + over(down, b, b1)
-            }
-        }
     }
 
     /// Appends the phases from b0 to b1 and records what limits them.

@@ -20,7 +20,7 @@ use kinematics::{JointPos, Machine, MotorPos};
 
 use super::barrier::{Constraints, JERK_OF_REST, NEXT_WEIGHT, PointConstraints, Problem, SWEEPS, State};
 use super::profile::{Phase, Profile, SpeedCap};
-use super::{acceleration, straight};
+use super::straight;
 use crate::joint_path::{JointPath, PathDerivatives, PathGeometry, third_derivative};
 use crate::path::Piece;
 
@@ -43,7 +43,7 @@ pub(super) fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Pr
             straight::profile(machine, path.intervals[0].first[0], cap.pen_mm_s / path.intervals[0].pen_speed)
         }
         PathGeometry::Drawn(_, section) => {
-            let fastest = acceleration::profile(machine, path, cap);
+            let fastest = super::without_jerk(machine, path, cap);
             let intervals = intervals(machine, path, section, cap, &fastest);
             let found = intervals.and_then(|intervals| optimize(machine, section, &intervals));
             found.unwrap_or_else(|| slowed_until_smooth(machine, fastest, cap))
@@ -259,9 +259,12 @@ impl SquaredSpeeds<'_> {
             self.at += 1;
         }
         let phase = &self.phases[self.at];
-        let way = (s - phase.start).clamp(0.0, phase.position_at(phase.duration_s) - phase.start);
-        let way = if phase.piece > piece { 0.0 } else { way };
-        (phase.speed * phase.speed + 2.0 * phase.acceleration * way).max(0.0)
+        // Even in between, as with constant acceleration.
+        let (end, last, _) = phase.motion_at(phase.duration_s);
+        let share =
+            if phase.piece > piece { 0.0 } else { ((s - phase.start) / (end - phase.start)).clamp(0.0, 1.0) };
+        let square = phase.speed * phase.speed;
+        square + share * (last * last - square)
     }
 }
 

@@ -2,6 +2,7 @@
 //! the speed, acceleration and jerk limits of every motor.
 
 mod acceleration;
+mod arcs;
 mod barrier;
 mod constraints;
 mod fixed_duration;
@@ -13,6 +14,7 @@ use kinematics::Machine;
 
 use crate::joint_path::JointPath;
 
+pub(crate) use arcs::hermite;
 pub use fixed_duration::Easing;
 pub(crate) use fixed_duration::fixed_duration;
 #[cfg(feature = "unstable")]
@@ -21,21 +23,17 @@ pub use profile::{LimitingConstraints, Profile, SpeedCap};
 
 /// The fastest profile along `path` under the machine's motors and the cap.
 pub fn profile(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    if jerk::applies(machine) {
-        jerk::profile(machine, path, cap)
-    } else {
-        acceleration::profile(machine, path, cap)
-    }
+    if jerk::applies(machine) { jerk::profile(machine, path, cap) } else { without_jerk(machine, path, cap) }
 }
 
-/// The duration on the path's own grid, without refinement and jerk limits, s.
-pub(crate) fn rough_duration(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> f64 {
-    acceleration::rough_duration(machine, path, cap)
+/// The fastest profile whatever the jerk.
+pub(crate) fn without_jerk(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
+    arcs::profile(machine, path, cap).unwrap_or_else(|| acceleration::profile(machine, path, cap))
 }
 
-/// The same on the path's own grid: without jerk limits and without refinement, ten times as fast
-/// to compute, with a duration within a few per cent of the optimum.
+/// The profile with one acceleration on each of the path's intervals: what plans fall back on where
+/// no arcs are found, with a duration within some per cent of the optimum.
 #[cfg(feature = "unstable")]
-pub fn profile_without_refinement(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
-    acceleration::profile_without_refinement(machine, path, cap)
+pub fn profile_on_grid(machine: &Machine, path: &JointPath, cap: &SpeedCap) -> Profile {
+    acceleration::profile(machine, path, cap)
 }

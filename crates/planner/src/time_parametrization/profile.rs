@@ -1,13 +1,14 @@
 //! Velocity profiles: phases of closed-form motion along a joint path, and what limits them.
 
-/// A part of a profile with constant acceleration, or with an acceleration that changes linearly
-/// with time or with position.
+/// A part of a profile: a polynomial of degree 5 in time, or a motion whose acceleration changes
+/// linearly with position.
 ///
-/// With `t` from its beginning: `s = start + speed S + acceleration C + jerk t³ / 6`, where `S = t`
-/// and `C = t²/2`. If the acceleration changes with position,
+/// With `t` from its beginning:
+/// `s = start + speed S + acceleration C + jerk t³ / 6 + fourth t⁴ + fifth t⁵`, where `S = t` and
+/// `C = t²/2`. If the acceleration changes with position,
 /// `d²s/dt² = acceleration + acceleration_slope (s - start)`: then, with k² that slope,
-/// `S = sinh(k t) / k` and `C = (cosh(k t) - 1) / k²` (sin and cos where the slope is negative). At
-/// most one of `jerk` and `acceleration_slope` is not 0.
+/// `S = sinh(k t) / k` and `C = (cosh(k t) - 1) / k²` (sin and cos where the slope is negative), and
+/// the further terms are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
     /// Index of the piece it lies on.
@@ -22,6 +23,10 @@ pub struct Phase {
     pub acceleration_slope: f64,
     /// Change of the acceleration with time, units/s³.
     pub jerk: f64,
+    /// Coefficient of t⁴, units/s⁴.
+    pub fourth: f64,
+    /// Coefficient of t⁵, units/s⁵.
+    pub fifth: f64,
     /// Its duration, s; positive.
     pub duration_s: f64,
 }
@@ -29,13 +34,35 @@ pub struct Phase {
 impl Phase {
     /// With constant acceleration.
     pub(super) fn even(piece: usize, start: f64, speed: f64, acceleration: f64, duration_s: f64) -> Self {
-        Self { piece, start, speed, acceleration, acceleration_slope: 0.0, jerk: 0.0, duration_s }
+        Self {
+            piece,
+            start,
+            speed,
+            acceleration,
+            acceleration_slope: 0.0,
+            jerk: 0.0,
+            fourth: 0.0,
+            fifth: 0.0,
+            duration_s,
+        }
+    }
+
+    /// Position on the piece, speed and acceleration, `t` s after a phase began whose acceleration
+    /// does not depend on the position.
+    pub(super) fn motion_at(&self, t: f64) -> (f64, f64, f64) {
+        let speed = self.speed
+            + t * (self.acceleration
+                + t * (0.5 * self.jerk + t * (4.0 * self.fourth + t * 5.0 * self.fifth)));
+        let acceleration =
+            self.acceleration + t * (self.jerk + t * (12.0 * self.fourth + t * 20.0 * self.fifth));
+        (self.position_at(t), speed, acceleration)
     }
 
     /// Position on the piece, `t` s after the phase began.
     pub fn position_at(&self, t: f64) -> f64 {
         if self.acceleration_slope == 0.0 {
-            return self.start + t * (self.speed + t * (0.5 * self.acceleration + t * self.jerk / 6.0));
+            let higher = self.jerk / 6.0 + t * (self.fourth + t * self.fifth);
+            return self.start + t * (self.speed + t * (0.5 * self.acceleration + t * higher));
         }
         let square = self.acceleration_slope * t * t;
         let (first, second) = if square.abs() < 1e-4 {
@@ -108,6 +135,8 @@ impl Profile {
             phase.acceleration *= slower * slower;
             phase.acceleration_slope *= slower * slower;
             phase.jerk *= slower * slower * slower;
+            phase.fourth *= slower * slower * slower * slower;
+            phase.fifth *= slower * slower * slower * slower * slower;
             phase.duration_s *= factor;
         }
         self.duration_s *= factor;

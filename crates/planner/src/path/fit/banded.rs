@@ -4,6 +4,8 @@
 #[derive(Default)]
 pub(super) struct Banded<const W: usize> {
     rows: Vec<[f64; W]>,
+    /// The number of unknowns.
+    count: usize,
     /// The right side; after [`Self::solve`] the solution.
     pub(super) right: Vec<f64>,
 }
@@ -11,16 +13,39 @@ pub(super) struct Banded<const W: usize> {
 impl<const W: usize> Banded<W> {
     /// Sets all coefficients of a system of `count` unknowns to 0.
     pub(super) fn reset(&mut self, count: usize) {
+        // With rows of 0 behind the last one, so that each has W - 1 after it.
+        self.count = count;
         self.rows.clear();
-        self.rows.resize(count, [0.0; W]);
+        self.rows.resize(count + W - 1, [0.0; W]);
         self.right.clear();
-        self.right.resize(count, 0.0);
+        self.right.resize(count + W - 1, 0.0);
     }
 
-    /// Adds to the coefficients (i, j) and (j, i).
+    /// Adds to the coefficients (i, j) and (j, i), where i is at most j.
     #[inline]
     pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
-        self.rows[i.min(j)][i.abs_diff(j)] += value;
+        self.rows[i][j - i] += value;
+    }
+
+    /// Adds a symmetric matrix, given on and above its diagonal, to the W unknowns from `base` on and
+    /// subtracts a gradient from the right side; without unknowns outside of the system.
+    pub(super) fn add_block(&mut self, base: isize, gradient: &[f64; W], matrix: &[[f64; W]; W]) {
+        let inside = |k: usize| usize::try_from(base + k as isize).ok().filter(|index| *index < self.count);
+        // Columns behind the end get no value: their rows are not part of the system.
+        let end = (self.count as isize - base).clamp(0, W as isize) as usize;
+        for k in 0..W {
+            let Some(index) = inside(k) else { continue };
+            self.right[index] -= gradient[k];
+            let row = &mut self.rows[index];
+            for (value, add) in row.iter_mut().zip(&matrix[k][k..end]) {
+                *value += add;
+            }
+        }
+    }
+
+    /// The solution after [`Self::solve`].
+    pub(super) fn solution(&self) -> &[f64] {
+        &self.right[..self.count]
     }
 
     /// Solves by L D Lᵀ in place; false if the matrix is not positive definite.
@@ -28,30 +53,31 @@ impl<const W: usize> Banded<W> {
     /// The relative 1e-9 on the diagonal keeps the pivots of nearly singular systems positive: it
     /// shortens the step along directions that the objective does not determine.
     pub(super) fn solve(&mut self) -> bool {
-        let count = self.rows.len();
-        for i in 0..count {
-            let mut pivot = self.rows[i];
+        for i in 0..self.count {
+            let (eliminated, after) = self.rows.split_at_mut(i + 1);
+            let (row, Some(after)) = (&mut eliminated[i], after.get_mut(..W - 1)) else { return false };
+            let mut pivot = *row;
             pivot[0] *= 1.0 + 1e-9;
             if !(pivot[0] > 0.0 && pivot[0].is_finite()) {
                 return false;
             }
-            let right = self.right[i];
+            let (solved, rights) = self.right.split_at_mut(i + 1);
+            let (right, Some(rights)) = (solved[i], rights.get_mut(..W - 1)) else { return false };
             let inverse = 1.0 / pivot[0];
-            let below = (W - 1).min(count - 1 - i);
-            for q in 1..=below {
+            row[0] = inverse;
+            for q in 1..W {
                 let factor = pivot[q] * inverse;
-                let row = &mut self.rows[i + q];
-                for (x, p) in row[..W - q].iter_mut().zip(&pivot[q..]) {
-                    *x -= factor * p;
+                row[q] = factor;
+                rights[q - 1] -= factor * right;
+                let target = &mut after[q - 1];
+                for k in 0..W - q {
+                    target[k] -= factor * pivot[q + k];
                 }
-                self.right[i + q] -= factor * right;
-                self.rows[i][q] = factor;
             }
-            self.rows[i][0] = inverse;
         }
-        for i in (0..count).rev() {
+        for i in (0..self.count).rev() {
             let row = &self.rows[i];
-            let after = &self.right[i + 1..];
+            let Some(after) = self.right.get(i + 1..i + W) else { return false };
             let known: f64 = row[1..].iter().zip(after).map(|(l, x)| l * x).sum();
             self.right[i] = self.right[i] * row[0] - known;
         }
@@ -84,10 +110,10 @@ mod tests {
                 }
                 system.right[i] = row[0] - row[3];
             }
-            let right = system.right.clone();
+            let right = system.solution().to_vec();
             prop_assert!(system.solve());
             for (row, right) in dense.iter().zip(&right) {
-                let product: f64 = row.iter().zip(&system.right).map(|(a, x)| a * x).sum();
+                let product: f64 = row.iter().zip(system.solution()).map(|(a, x)| a * x).sum();
                 prop_assert!((product - right).abs() < 1e-6);
             }
         }

@@ -38,13 +38,54 @@ const LAST_WEIGHT: f64 = 1e-3;
 /// Share of the limits that b starts with: in corners, and for changes of speed.
 const GENTLE: (f64, f64) = (0.5, 0.8);
 
-/// A place on a span.
-struct Place {
-    /// Weights of the control points j - 1 to j + 2 for S' and S''.
-    rows: [[f64; 4]; 2],
-    forms: MotorForms,
-    /// The share of the span's length.
-    share: f64,
+/// Places on a span at which limits are held, as shares of its length.
+const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
+
+/// A span of the spline. In terms of the change of S over it divided by its length, D, and of S'' at
+/// its ends, P and R, with the share f of its length:
+///
+/// ```text
+/// S' = D + h ((1/6 - (1 - f)²/2) P + (f²/2 - 1/6) R),   S'' = (1 - f) P + f R
+/// ```
+struct Span {
+    /// Weights of the control points j - 1 to j + 2 for D, P and R.
+    rows: [[f64; 4]; 3],
+    length: f64,
+    /// At each place.
+    forms: [MotorForms; 3],
+    /// Whether a motor may reach its speed limit before the pen does, by motor.
+    may_limit_speed: [bool; 2],
+}
+
+impl Span {
+    /// D, P and R.
+    #[inline]
+    fn bends(&self, control: &[Vec2], j: usize) -> [Vec2; 3] {
+        let last = control.len() - 1;
+        // Where an index is clamped its weight is 0.
+        let points = [0, 1, 2, 3].map(|k| control[(j + k).saturating_sub(1).min(last)]);
+        self.rows.map(|row| row[0] * points[0] + row[1] * points[1] + row[2] * points[2] + row[3] * points[3])
+    }
+
+    /// Weights of P and R for S' at a place.
+    #[inline]
+    fn weights(&self, place: usize) -> [f64; 2] {
+        let f = PLACES[place];
+        [self.length * (1.0 / 6.0 - 0.5 * (1.0 - f) * (1.0 - f)), self.length * (0.5 * f * f - 1.0 / 6.0)]
+    }
+
+    /// S' and S'' at a place.
+    #[inline]
+    fn derivatives(&self, [d, p, r]: &[Vec2; 3], place: usize) -> [Vec2; 2] {
+        let (f, [by_p, by_r]) = (PLACES[place], self.weights(place));
+        [*d + by_p * *p + by_r * *r, (1.0 - f) * *p + f * *r]
+    }
+}
+
+/// Whether speed limits are held at a place: the end of a span is the start of the next one, where
+/// only the change of speed is another.
+fn has_caps(place: usize) -> bool {
+    place < 2
 }
 
 /// The path and the limits.
@@ -60,21 +101,22 @@ pub(super) struct Problem<'a> {
 #[derive(Default)]
 pub(super) struct Workspace {
     system: Banded<12>,
-    places: Vec<[Place; 3]>,
+    spans: Vec<Span>,
     /// A copy of the control points and of b, equal to them outside of a step.
     control: Vec<Vec2>,
     b: Vec<f64>,
 }
 
 impl Problem<'_> {
-    /// The derivatives at three places of span j.
-    fn places(&self, spline: &Spline, j: usize) -> Option<[Place; 3]> {
+    fn span(&self, spline: &Spline, j: usize) -> Option<Span> {
         let curve = drawing::Segment::Cubic(spline.bezier(j));
-        let place = |share: f64| {
-            let forms = self.limits.near(curve.eval(share))?;
-            Some(Place { rows: spline.derivative_weights(j, share), forms, share })
-        };
-        Some([place(0.0)?, place(0.5)?, place(1.0)?])
+        let at = |share: f64| self.limits.near(curve.eval(share));
+        let forms = [at(PLACES[0])?, at(PLACES[1])?, at(PLACES[2])?];
+        let may_limit_speed = [0, 1].map(|k| {
+            let fastest = self.limits.square_pen_speed * self.limits.square_ratios[k];
+            forms.iter().any(|forms| forms.linear[k].hypot2() * fastest > 1.0)
+        });
+        Some(Span { rows: spline.span_weights(j), length: spline.span(j), forms, may_limit_speed })
     }
 
     /// Low b at all knots from which any limit is some way off; `None` if the path leaves the reach.
@@ -88,18 +130,20 @@ impl Problem<'_> {
         let mut changes = Vec::with_capacity(count - 1);
         for j in 0..count - 1 {
             let (mut most, mut slowness) = (f64::INFINITY, 0.0_f64);
-            for place in self.places(spline, j)? {
-                let [first, second] = derivatives(&spline.control, &place.rows, j);
+            let span = self.span(spline, j)?;
+            let bends = span.bends(&spline.control, j);
+            for (place, forms) in span.forms.iter().enumerate() {
+                let [first, second] = span.derivatives(&bends, place);
                 most = most.min(self.limits.square_pen_speed / first.hypot2());
                 for k in 0..2 {
-                    let (m1, m2, _) = place.forms.motor(k, first, second);
+                    let (m1, m2, _) = forms.motor(k, first, second);
                     most = most.min(1.0 / m2.abs()).min(1.0 / (m1 * m1 * self.limits.square_ratios[k]));
                     slowness = slowness.max(m1.abs());
                 }
             }
             b[j] = b[j].min(GENTLE.0 * most);
             b[j + 1] = b[j + 1].min(GENTLE.0 * most);
-            changes.push(GENTLE.1 * spline.span(j) / slowness);
+            changes.push(GENTLE.1 * span.length / slowness);
         }
         (b[0], b[count - 1]) = (0.0, 0.0);
         for j in 0..count - 1 {
@@ -121,9 +165,9 @@ impl Problem<'_> {
         work: &mut Workspace,
     ) -> Option<()> {
         let spans = block.start.saturating_sub(2)..(block.end + 1).min(spline.count() - 1);
-        work.places.clear();
+        work.spans.clear();
         for j in spans.clone() {
-            work.places.push(self.places(spline, j)?);
+            work.spans.push(self.span(spline, j)?);
         }
         if work.control.len() != spline.count() {
             work.control.clone_from(&spline.control);
@@ -133,7 +177,7 @@ impl Problem<'_> {
         work.control[around.clone()].copy_from_slice(&spline.control[around.clone()]);
         work.b[around.clone()].copy_from_slice(&b[around]);
         let constraints = (block.len() * 22) as f64;
-        let mut cost = self.cost(spline, &work.control, &work.b, block, &spans, &work.places)?;
+        let mut cost = self.cost(spline, &work.control, &work.b, block, &spans, &work.spans)?;
         let mut mu = FIRST_WEIGHT * cost.time / constraints;
         for _ in 0..STEPS {
             self.assemble(spline, b, block, &spans, mu, work);
@@ -141,18 +185,18 @@ impl Problem<'_> {
                 break;
             }
             let mut t = 1.0_f64;
-            for (i, step) in block.clone().zip(work.system.right.chunks_exact(3)) {
+            for (i, step) in block.clone().zip(work.system.solution().chunks_exact(3)) {
                 if step[2] < 0.0 {
                     t = t.min(-0.95 * b[i] / step[2]);
                 }
             }
             let mut accepted = None;
             while t > 1e-5 && accepted.is_none() {
-                for (i, step) in block.clone().zip(work.system.right.chunks_exact(3)) {
+                for (i, step) in block.clone().zip(work.system.solution().chunks_exact(3)) {
                     work.control[i] = spline.control[i] + t * Vec2::new(step[0], step[1]);
                     work.b[i] = b[i] + t * step[2];
                 }
-                let after = self.cost(spline, &work.control, &work.b, block, &spans, &work.places);
+                let after = self.cost(spline, &work.control, &work.b, block, &spans, &work.spans);
                 accepted = after.filter(|after| after.with(mu) < cost.with(mu));
                 t *= if accepted.is_some() { 1.0 } else { 0.5 };
             }
@@ -186,14 +230,14 @@ impl Problem<'_> {
         b: &[f64],
         block: &Range<usize>,
         spans: &Range<usize>,
-        places: &[[Place; 3]],
+        of: &[Span],
     ) -> Option<Cost> {
         if block.clone().any(|i| b[i].is_nan() || b[i] <= 0.0) {
             return None;
         }
         let mut time = 0.0;
-        for j in spans.clone() {
-            time += 2.0 * spline.span(j) / (b[j].sqrt() + b[j + 1].sqrt());
+        for (j, span) in spans.clone().zip(of) {
+            time += 2.0 * span.length / (b[j].sqrt() + b[j + 1].sqrt());
         }
         if let Some(energy) = self.smoothing {
             // A control point changes the second derivative of the knots next to it.
@@ -205,31 +249,38 @@ impl Problem<'_> {
             let e = spline.value_of(control, i) - self.samples[i].to_vec2();
             1.0 - e.hypot2() / (self.radii[i] * self.radii[i])
         });
-        let slacks = spans.clone().zip(places).flat_map(|(j, places)| {
-            let c = (b[j + 1] - b[j]) / spline.span(j);
-            places.iter().map(move |place| self.slack(place, control, j, b, c))
-        });
+        let slacks = spans
+            .clone()
+            .zip(of)
+            .map(|(j, span)| self.slack(span, &span.bends(control, j), [b[j], b[j + 1]]));
         let barrier = sum_of_logs(discs.chain(slacks));
         (barrier.is_finite() && time.is_finite()).then_some(Cost { time, barrier })
     }
 
-    /// The product of all slacks at a place, -1 if one is not positive.
+    /// The product of all slacks of a span, -1 if one is not positive.
     #[inline]
-    fn slack(&self, place: &Place, control: &[Vec2], j: usize, b: &[f64], c: f64) -> f64 {
-        let [first, second] = derivatives(control, &place.rows, j);
-        let b = (1.0 - place.share) * b[j] + place.share * b[j + 1];
+    fn slack(&self, span: &Span, bends: &[Vec2; 3], [b0, b1]: [f64; 2]) -> f64 {
+        let half_c = 0.5 * (b1 - b0) / span.length;
         let mut product = 1.0;
         let mut valid = true;
-        let mut hold = |slack: f64| {
-            valid &= slack > 0.0;
-            product *= slack;
-        };
-        hold(1.0 - b * first.hypot2() / self.limits.square_pen_speed);
-        for k in 0..2 {
-            let (m1, m2, _) = place.forms.motor(k, first, second);
-            hold(1.0 - b * m1 * m1 * self.limits.square_ratios[k]);
-            let g = 0.5 * c * m1 + b * m2;
-            hold(1.0 - g * g);
+        for (place, forms) in span.forms.iter().enumerate() {
+            let [first, second] = span.derivatives(bends, place);
+            let b = b0 + PLACES[place] * (b1 - b0);
+            let mut hold = |slack: f64| {
+                valid &= slack > 0.0;
+                product *= slack;
+            };
+            if has_caps(place) {
+                hold(1.0 - b * first.hypot2() / self.limits.square_pen_speed);
+            }
+            for k in 0..2 {
+                let (m1, m2, _) = forms.motor(k, first, second);
+                if has_caps(place) && span.may_limit_speed[k] {
+                    hold(1.0 - b * m1 * m1 * self.limits.square_ratios[k]);
+                }
+                let g = half_c * m1 + b * m2;
+                hold(1.0 - g * g);
+            }
         }
         if valid { product } else { -1.0 }
     }
@@ -243,7 +294,7 @@ impl Problem<'_> {
         mu: f64,
         work: &mut Workspace,
     ) {
-        let Workspace { system, places, .. } = work;
+        let Workspace { system, spans: of, .. } = work;
         let (from, count) = (block.start, block.len());
         system.reset(3 * count);
         if let Some(energy) = self.smoothing {
@@ -275,55 +326,68 @@ impl Problem<'_> {
                 }
             }
         }
-        for (j, places) in spans.clone().zip(places) {
+        for (j, span) in spans.clone().zip(of) {
             let mut local = Local::default();
-            let (h, b0, b1) = (spline.span(j), b[j], b[j + 1]);
-            local.add_time(h, b0.sqrt(), b1.sqrt());
-            for place in places.iter() {
-                self.add_place(place, &spline.control, j, [b0, b1], h, mu, &mut local);
+            local.add_time(span.length, b[j].sqrt(), b[j + 1].sqrt());
+            let bends = span.bends(&spline.control, j);
+            for place in 0..PLACES.len() {
+                self.add_place(span, place, &bends, [b[j], b[j + 1]], mu, &mut local);
             }
-            local.scatter(system, j, from, count);
+            local.scatter(&span.rows, system, 3 * (j as isize - 1 - from as isize));
         }
     }
 
     /// Adds the barrier at one place.
-    #[expect(clippy::too_many_arguments, reason = "all of the problem")]
+    #[inline]
     fn add_place(
         &self,
-        place: &Place,
-        control: &[Vec2],
-        j: usize,
+        span: &Span,
+        place: usize,
+        bends: &[Vec2; 3],
         [b0, b1]: [f64; 2],
-        h: f64,
         mu: f64,
         local: &mut Local,
     ) {
-        let [first, second] = derivatives(control, &place.rows, j);
-        let (w0, w1) = (1.0 - place.share, place.share);
-        let (b, c) = (w0 * b0 + w1 * b1, (b1 - b0) / h);
-        let mut quadratic = Quadratic::default();
-        // -log(1 - b value), where `by` is the gradient of value by S'.
-        let mut cap = |value: f64, by: Vec2| {
-            let slack = 1.0 / (1.0 - b * value);
-            quadratic.add(&[b * by.x, b * by.y, 0.0, 0.0, value, 0.0], mu * slack, mu * slack * slack);
+        let (f, forms) = (PLACES[place], &span.forms[place]);
+        let [first, second] = span.derivatives(bends, place);
+        let (b, rate) = (b0 + f * (b1 - b0), 0.5 / span.length);
+        let half_c = rate * (b1 - b0);
+        let [by_p, by_r] = span.weights(place);
+        // The gradient by the span's unknowns, from those by S', S'' and both b.
+        let by = |one: Vec2, two: Vec2, b0: f64, b1: f64| {
+            let (p, r) = (by_p * one + (1.0 - f) * two, by_r * one + f * two);
+            [one.x, p.x, r.x, one.y, p.y, r.y, b0, b1]
         };
-        let pen = 1.0 / self.limits.square_pen_speed;
-        cap(pen * first.hypot2(), 2.0 * pen * first);
-        for k in 0..2 {
-            let (m1, _, _) = place.forms.motor(k, first, second);
-            let ratio = self.limits.square_ratios[k];
-            cap(ratio * m1 * m1, 2.0 * ratio * m1 * place.forms.linear[k]);
+        if has_caps(place) {
+            // -log(1 - b value), where `slope` is the gradient of value by S'.
+            let mut cap = |value: f64, slope: Vec2| {
+                let slack = 1.0 / (1.0 - b * value);
+                let gradient = by(b * slope, Vec2::ZERO, (1.0 - f) * value, f * value);
+                local.add(&gradient, mu * slack, mu * slack * slack);
+            };
+            let pen = 1.0 / self.limits.square_pen_speed;
+            cap(pen * first.hypot2(), 2.0 * pen * first);
+            for k in 0..2 {
+                if span.may_limit_speed[k] {
+                    let (m1, _, _) = forms.motor(k, first, second);
+                    let ratio = self.limits.square_ratios[k];
+                    cap(ratio * m1 * m1, 2.0 * ratio * m1 * forms.linear[k]);
+                }
+            }
         }
         for k in 0..2 {
-            let (m1, m2, m2_by_first) = place.forms.motor(k, first, second);
-            let g = 0.5 * c * m1 + b * m2;
+            let (m1, m2, m2_by_first) = forms.motor(k, first, second);
+            let g = half_c * m1 + b * m2;
             let (up, down) = (1.0 / (1.0 - g), 1.0 / (1.0 + g));
-            let linear = place.forms.linear[k];
-            let by = 0.5 * c * linear + b * m2_by_first;
-            let gradient = [by.x, by.y, b * linear.x, b * linear.y, m2, 0.5 * m1];
-            quadratic.add(&gradient, mu * (up - down), mu * (up * up + down * down));
+            let linear = forms.linear[k];
+            let gradient = by(
+                half_c * linear + b * m2_by_first,
+                b * linear,
+                (1.0 - f) * m2 - rate * m1,
+                f * m2 + rate * m1,
+            );
+            local.add(&gradient, mu * (up - down), mu * (up * up + down * down));
         }
-        local.add(&quadratic, &place.rows, [w0, w1], 1.0 / h);
     }
 }
 
@@ -342,76 +406,29 @@ impl Cost {
     }
 }
 
-/// S' and S''.
-#[inline]
-fn derivatives(control: &[Vec2], rows: &[[f64; 4]; 2], j: usize) -> [Vec2; 2] {
-    let last = control.len() - 1;
-    let mut sums = [Vec2::ZERO; 2];
-    for k in 0..4 {
-        // Where an index is clamped its weight is 0.
-        let point = control[(j + k).saturating_sub(1).min(last)];
-        sums[0] += rows[0][k] * point;
-        sums[1] += rows[1][k] * point;
-    }
-    sums
-}
-
-/// Gradient and Hessian by S', S'', b and c at one place.
-#[derive(Default)]
-struct Quadratic {
-    gradient: [f64; 6],
-    hessian: [[f64; 6]; 6],
-}
-
-impl Quadratic {
-    /// Adds `slope` times a gradient, and `curvature` times its product with itself.
-    #[inline]
-    fn add(&mut self, by: &[f64; 6], slope: f64, curvature: f64) {
-        for p in 0..6 {
-            self.gradient[p] += slope * by[p];
-            let factor = curvature * by[p];
-            self.hessian[p].iter_mut().zip(by).for_each(|(h, by)| *h += factor * by);
-        }
-    }
-}
-
-/// Gradient and Hessian by the unknowns of a span: x and y of four control points, and two b.
+/// Gradient and Hessian by the unknowns of a span: x of D, P and R, y of them, and b at both ends.
 #[derive(Default)]
 struct Local {
-    gradient: [f64; 10],
-    hessian: [[f64; 10]; 10],
+    gradient: [f64; 8],
+    /// On and above the diagonal.
+    hessian: [[f64; 8]; 8],
 }
 
 impl Local {
-    /// Adds a function of S', S'', b and c, given how those depend on the unknowns: the weights of
-    /// the control points and of b, and `1 / h` for c.
-    #[expect(clippy::needless_range_loop, reason = "columns of two matrices")]
+    /// Adds `slope` times a gradient, and `curvature` times its product with itself.
+    #[expect(clippy::needless_range_loop, reason = "fixed bounds, which the compiler unrolls")]
     #[inline]
-    fn add(&mut self, of: &Quadratic, [d1, d2]: &[[f64; 4]; 2], [w0, w1]: [f64; 2], rate: f64) {
-        // The six rows of the Hessian times the derivatives by the unknowns.
-        let mut half = [[0.0; 10]; 6];
-        for (row, half) in of.hessian.iter().zip(&mut half) {
-            for p in 0..4 {
-                half[2 * p] = d1[p] * row[0] + d2[p] * row[2];
-                half[2 * p + 1] = d1[p] * row[1] + d2[p] * row[3];
-            }
-            half[8] = w0 * row[4] - rate * row[5];
-            half[9] = w1 * row[4] + rate * row[5];
+    fn add(&mut self, by: &[f64; 8], slope: f64, curvature: f64) {
+        for p in 0..8 {
+            self.gradient[p] += slope * by[p];
         }
-        let g = &of.gradient;
-        for p in 0..4 {
-            self.gradient[2 * p] += d1[p] * g[0] + d2[p] * g[2];
-            self.gradient[2 * p + 1] += d1[p] * g[1] + d2[p] * g[3];
-            for q in 0..10 {
-                self.hessian[2 * p][q] += d1[p] * half[0][q] + d2[p] * half[2][q];
-                self.hessian[2 * p + 1][q] += d1[p] * half[1][q] + d2[p] * half[3][q];
+        for p in 0..8 {
+            let factor = curvature * by[p];
+            // In pairs: from the diagonal or the element before it.
+            for pair in p / 2..4 {
+                self.hessian[p][2 * pair] += factor * by[2 * pair];
+                self.hessian[p][2 * pair + 1] += factor * by[2 * pair + 1];
             }
-        }
-        self.gradient[8] += w0 * g[4] - rate * g[5];
-        self.gradient[9] += w1 * g[4] + rate * g[5];
-        for q in 8..10 {
-            self.hessian[8][q] += w0 * half[4][q] - rate * half[5][q];
-            self.hessian[9][q] += w1 * half[4][q] + rate * half[5][q];
         }
     }
 
@@ -425,37 +442,59 @@ impl Local {
                 self.hessian[index][index] += h / (2.0 * square * r * r * r) + h / (square * sum * r * r);
             }
         };
-        end(8, r0);
-        end(9, r1);
+        end(6, r0);
+        end(7, r1);
         if r0 > 0.0 && r1 > 0.0 {
-            self.hessian[8][9] += h / (square * sum * r0 * r1);
+            self.hessian[6][7] += h / (square * sum * r0 * r1);
         }
     }
 
-    /// Adds it to the system of the knots from `from` on.
-    fn scatter(&self, system: &mut Banded<12>, j: usize, from: usize, count: usize) {
-        let mut at = [usize::MAX; 10];
-        for p in 0..4 {
-            if let Some(index) = (j + p).checked_sub(from + 1).filter(|index| *index < count) {
-                at[2 * p] = 3 * index;
-                at[2 * p + 1] = 3 * index + 1;
-            }
-        }
-        for p in 0..2 {
-            if let Some(index) = (j + p).checked_sub(from).filter(|index| *index < count) {
-                at[8 + p] = 3 * index + 2;
-            }
-        }
-        for p in 0..10 {
-            if at[p] == usize::MAX {
-                continue;
-            }
-            system.right[at[p]] -= self.gradient[p];
-            for q in p..10 {
-                if at[q] != usize::MAX {
-                    system.add(at[p], at[q], self.hessian[p][q]);
+    /// Adds it to the system, where the span's first control point has the unknowns from `base` on.
+    #[expect(clippy::needless_range_loop, reason = "rows and columns of several matrices")]
+    fn scatter(&self, rows: &[[f64; 4]; 3], system: &mut Banded<12>, base: isize) {
+        let h = &self.hessian;
+        let block = |at: usize, to: usize| {
+            [0, 1, 2].map(|p| {
+                [0, 1, 2].map(|q| if at == to && q < p { h[at + q][at + p] } else { h[at + p][to + q] })
+            })
+        };
+        let (xx, xy, yy) = (both(rows, &block(0, 0)), both(rows, &block(0, 3)), both(rows, &block(3, 3)));
+        let by_control =
+            |k: usize, column: &dyn Fn(usize) -> f64| (0..3).map(|p| rows[p][k] * column(p)).sum::<f64>();
+        // As in the system: x, y and b of four knots; the first and last b are not of this span.
+        let (mut gradient, mut full) = ([0.0; 12], [[0.0; 12]; 12]);
+        for k in 0..4 {
+            for l in k..4 {
+                full[3 * k][3 * l] = xx[k][l];
+                full[3 * k][3 * l + 1] = xy[k][l];
+                full[3 * k + 1][3 * l + 1] = yy[k][l];
+                if l > k {
+                    full[3 * k + 1][3 * l] = xy[l][k];
                 }
             }
+            for end in 0..2 {
+                let b = 3 * (end + 1) + 2;
+                let values = [0, 3].map(|of| by_control(k, &|p| h[of + p][6 + end]));
+                for (axis, value) in values.into_iter().enumerate() {
+                    let at = 3 * k + axis;
+                    full[at.min(b)][at.max(b)] = value;
+                }
+            }
+            gradient[3 * k] = by_control(k, &|p| self.gradient[p]);
+            gradient[3 * k + 1] = by_control(k, &|p| self.gradient[3 + p]);
         }
+        (gradient[5], gradient[8]) = (self.gradient[6], self.gradient[7]);
+        (full[5][5], full[5][8], full[8][8]) = (h[6][6], h[6][7], h[7][7]);
+        system.add_block(base, &gradient, &full);
     }
+}
+
+/// `rowsᵀ m rows`.
+#[inline]
+fn both(rows: &[[f64; 4]; 3], m: &[[f64; 3]; 3]) -> [[f64; 4]; 4] {
+    let half = [0, 1, 2]
+        .map(|p| [0, 1, 2, 3].map(|l| m[p][0] * rows[0][l] + m[p][1] * rows[1][l] + m[p][2] * rows[2][l]));
+    [0, 1, 2, 3].map(|k| {
+        [0, 1, 2, 3].map(|l| rows[0][k] * half[0][l] + rows[1][k] * half[1][l] + rows[2][k] * half[2][l])
+    })
 }

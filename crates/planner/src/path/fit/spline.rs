@@ -137,9 +137,10 @@ impl Spline {
         CubicBez::new(end(j), a.lerp(b, one).to_point(), a.lerp(b, two).to_point(), end(j + 1))
     }
 
-    /// Weights of the control points j - 1 to j + 2 for the first and second derivative at the share
-    /// `f` of span j, with the mirrored control points folded in.
-    pub(super) fn derivative_weights(&self, j: usize, f: f64) -> [[f64; 4]; 2] {
+    /// Weights of the control points j - 1 to j + 2 for the change over span j divided by its length,
+    /// and for the second derivatives at its start and end, with the mirrored control points folded
+    /// in.
+    pub(super) fn span_weights(&self, j: usize) -> [[f64; 4]; 3] {
         let h = self.span(j);
         let (mut start, mut end) = ([0.0; 4], [0.0; 4]);
         let (mut bend0, mut bend1) = ([0.0; 4], [0.0; 4]);
@@ -151,11 +152,6 @@ impl Spline {
         if j + 2 < self.count() {
             bend1[1..].copy_from_slice(&self.second[j + 1]);
         }
-        // The cubic with given ends and second derivatives P and R there has
-        // S' = dS/h + h ((1/6 - (1-f)²/2) P + (f²/2 - 1/6) R).
-        let (p, r) = (h * (1.0 / 6.0 - 0.5 * (1.0 - f) * (1.0 - f)), h * (0.5 * f * f - 1.0 / 6.0));
-        let first = [0, 1, 2, 3].map(|k| (end[k] - start[k]) / h + p * bend0[k] + r * bend1[k]);
-        let second = [0, 1, 2, 3].map(|k| (1.0 - f) * bend0[k] + f * bend1[k]);
         let fold = |mut row: [f64; 4]| {
             if j == 0 {
                 row = [0.0, row[1] + 2.0 * row[0], row[2] - row[0], row[3]];
@@ -165,7 +161,7 @@ impl Spline {
             }
             row
         };
-        [fold(first), fold(second)]
+        [fold([0, 1, 2, 3].map(|k| (end[k] - start[k]) / h)), fold(bend0), fold(bend1)]
     }
 }
 
@@ -207,14 +203,15 @@ mod tests {
                     prop_assert!((bend - spline.second_of(&spline.control, j)).hypot() < 1e-6);
                 }
                 for f in [0.0, 0.3, 0.5, 1.0] {
-                    let rows = spline.derivative_weights(j, f);
-                    let of = |row: [f64; 4]| (0..4).fold(Vec2::ZERO, |sum, k| {
+                    let [d, p, r] = spline.span_weights(j).map(|row| (0..4).fold(Vec2::ZERO, |sum, k| {
                         let index = (j + k).checked_sub(1).filter(|index| *index < samples.len());
                         sum + index.map_or(Vec2::ZERO, |index| row[k] * spline.control[index])
-                    });
+                    }));
+                    let by_p = h * (1.0 / 6.0 - 0.5 * (1.0 - f) * (1.0 - f));
+                    let first = d + by_p * p + h * (0.5 * f * f - 1.0 / 6.0) * r;
                     let exact = drawing::Segment::Cubic(curve).derivatives(f);
-                    prop_assert!((of(rows[0]) - exact.0 / h).hypot() < 1e-7);
-                    prop_assert!((of(rows[1]) - exact.1 / (h * h)).hypot() < 1e-5);
+                    prop_assert!((first - exact.0 / h).hypot() < 1e-7);
+                    prop_assert!(((1.0 - f) * p + f * r - exact.1 / (h * h)).hypot() < 1e-5);
                 }
                 before = Some((curve, h));
             }

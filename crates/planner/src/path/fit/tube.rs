@@ -182,7 +182,7 @@ fn newton(
         return false;
     }
     let mut longest = f64::INFINITY;
-    for (q, pair) in system.right.chunks_exact(2).enumerate() {
+    for (q, pair) in system.solution().chunks_exact(2).enumerate() {
         step[from + q] = Vec2::new(pair[0], pair[1]);
     }
     for (i, offset) in knots.clone().zip(offsets.iter_mut()) {
