@@ -26,6 +26,7 @@
 //!     lift_overlap_s: 0.0,
 //!     timing_law: TimingLaw::TimeOptimal,
 //!     rounding: Rounding::Path,
+//!     joint_fit: true,
 //!     allow_over_limit: false,
 //! };
 //! let compiled = compile(&document.pages[0].drawing, &machine, &request, &|_step| {})?;

@@ -57,6 +57,8 @@ pub struct Request {
     pub timing_law: TimingLaw,
     /// How rows take whole ticks.
     pub rounding: Rounding,
+    /// Whether path and speed of splines are optimized together, see [`planner::Settings`].
+    pub joint_fit: bool,
     /// Whether a plan that exceeds the motors' limits may be written; its certificate reports it.
     pub allow_over_limit: bool,
 }
@@ -322,6 +324,7 @@ pub fn compile<'a>(
     let settings = Settings {
         pen_speeds_mm_s: request.pen_speeds.clone(),
         timing_law: request.timing_law,
+        joint_fit: request.joint_fit,
         lift_overlap_s: request.lift_overlap_s,
         rounding: request.rounding,
         ..Settings::new(request.tolerance_mm, request.period_us)

@@ -45,6 +45,8 @@ pub struct Settings {
     pub segment_time_s: Option<f64>,
     /// How rows take whole ticks: `path` or `nearest`.
     pub rounding: &'static str,
+    /// Whether path and speed of splines were optimized together.
+    pub joint_fit: bool,
     /// Whether the motors' limits may be exceeded.
     pub allow_over_limit: bool,
 }
@@ -127,6 +129,7 @@ impl Settings {
             law,
             segment_time_s,
             rounding: request.rounding.name(),
+            joint_fit: request.joint_fit,
             allow_over_limit: request.allow_over_limit,
         }
     }

@@ -47,6 +47,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::default(),
         rounding: planner::Rounding::Path,
+        joint_fit: true,
         allow_over_limit: false,
     };
     let drawing = Drawing { strokes };

@@ -44,6 +44,7 @@ impl Zot {
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::TimeOptimal,
             rounding,
+            joint_fit: true,
             allow_over_limit: false,
         };
         let compiled =

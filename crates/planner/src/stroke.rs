@@ -40,7 +40,7 @@ pub(crate) struct PlannedStroke {
 type Lifted = Vec<(JointPath, JointPos)>;
 
 /// A spline is not tried where it could save at most this share of a stroke's time.
-const LEAST_GAIN: f64 = 2e-3;
+const LEAST_GAIN: f64 = 5e-3;
 
 /// Ratios of durations without jerk limits that decide between two ways to draw a stroke.
 const CLEARLY_FASTER: f64 = 0.92;

@@ -210,7 +210,8 @@ pub(crate) struct Planning {
     /// Order of the strokes [default: optimize; for --format hpgl and svg: file]
     #[arg(long, value_enum)]
     pub(crate) order: Option<Order>,
-    /// Ordering effort, from 0 to 3
+    /// Effort, from 0 to 3: of the ordering; with 0 the smoothest paths are planned instead of the
+    /// fastest
     #[arg(long, value_name = "LEVEL", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
     pub(crate) effort: u8,
     /// Remove duplicate strokes

@@ -137,6 +137,7 @@ fn request(planning: &Planning, crop: Option<Crop>, page: &Page, machine: &Machi
             cli::Rounding::Path => plan::Rounding::Path,
             cli::Rounding::Nearest => plan::Rounding::Nearest,
         },
+        joint_fit: planning.effort > 0,
         allow_over_limit: planning.allow_over_limit,
     }
 }

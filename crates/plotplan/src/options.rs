@@ -31,7 +31,7 @@ const MOTION: [&str; 8] =
 const PLACEMENT: [&str; 8] = ["fit", "shrink", "align", "place", "scale", "rotate", "mirror", "margin"];
 /// Options of placement that need a sheet.
 const ON_SHEET: [&str; 3] = ["fit", "shrink", "align"];
-/// Options of the ordering that `--order file` leaves out.
+/// Options of the ordering that `--order file` leaves out; `--effort 0` has an effect on paths too.
 const ORDERING: [&str; 3] = ["effort", "keep_direction", "pen_order"];
 /// Options of the firmware's pen.
 const PEN: [&str; 2] = ["pen_by", "pen_positions"];
@@ -172,7 +172,8 @@ fn planning(options: &Given<'_>) -> Option<String> {
         .refuse(&["segment_time"], &format!("with --law {law}"))
         .filter(|_| !is_fixed_duration)
         .or_else(|| {
-            options.refuse(&ORDERING, "with --order file").filter(|_| options.text("order") == "file")
+            let ids = if options.text("effort") == "0" { &ORDERING[1..] } else { &ORDERING[..] };
+            options.refuse(ids, "with --order file").filter(|_| options.text("order") == "file")
         })
         .or_else(|| margin(options))
 }

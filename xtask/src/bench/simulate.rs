@@ -35,6 +35,7 @@ fn planned(machine: &Machine) -> Result<(Vec<Row>, Drawing)> {
         lift_overlap_s: 0.0,
         timing_law: TimingLaw::TimeOptimal,
         rounding: planner::Rounding::Path,
+        joint_fit: true,
         allow_over_limit: false,
     };
     let compiled = pipeline::compile(&document.pages[0].drawing, machine, &request, &|_| {})?;

@@ -41,6 +41,9 @@ pub struct Summary {
     /// `acceleration of M in corners and curves`: there the limit is used up by the change of
     /// direction, so that the pen cannot go faster even at constant speed.
     pub limited_by_s: BTreeMap<String, f64>,
+    /// Strokes of more than one line whose corners are blended one by one, because no spline within the
+    /// tolerance and the reach is faster.
+    pub blended_strokes: usize,
     /// Share of the duration with the pen up.
     pub pen_up_share: f64,
     /// Coefficients `a b c d e f` of the map from drawing mm to machine mm: `x' = a x + c y + e`,
@@ -97,6 +100,7 @@ impl Summary {
                 .into_iter()
                 .map(|(what, s)| (what, round::s(s)))
                 .collect(),
+            blended_strokes: compiled.trajectory.blended_strokes(),
             pen_up_share: round::share((times.travel_s + times.lifting_s) / duration_s),
             placement: compiled.placement.as_coeffs().map(round::coefficient),
             pen_changes: text::pen_changes(compiled.ordered()),

@@ -40,6 +40,11 @@ impl<'a> Limits<'a> {
         limits
     }
 
+    /// The forms on a machine with linear kinematics, where they are the same everywhere.
+    pub(super) fn everywhere(&self) -> Option<MotorForms> {
+        self.everywhere
+    }
+
     /// The forms near a point; `None` if it is out of reach.
     pub(super) fn near(&self, p: Point) -> Option<MotorForms> {
         self.everywhere.or_else(|| self.evaluate(p))

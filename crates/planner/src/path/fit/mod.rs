@@ -38,7 +38,7 @@ use super::{
     tangent::distance,
 };
 pub use limits::Limits;
-use samples::{GROWTH, SMOOTH_GROWTH, Samples};
+use samples::{Grading, Samples};
 use spline::Spline;
 use tube::Energy;
 
@@ -96,8 +96,8 @@ pub fn fitted(stroke: &Stroke, limits: &Limits<'_>, tolerance: f64, aim: Aim) ->
         return None;
     }
     let radius = tolerance - (MERGE + SIMPLIFY) * tolerance - chord;
-    let growth = if aim == Aim::Fastest { GROWTH } else { SMOOTH_GROWTH };
-    Fit::new(Samples::of(&pieces, tolerance, growth), radius)?.run(limits, aim)
+    let grading = if aim == Aim::Fastest { Grading::FAST } else { Grading::SMOOTH };
+    Fit::new(Samples::of(&pieces, tolerance, grading), radius)?.run(limits, aim)
 }
 
 /// Removes vertices of sequences of lines that are within half of `least` of the last one kept; the

@@ -383,8 +383,8 @@ mod tests {
     #[test]
     fn polynomial_of_degree_five_is_found_from_values_and_derivatives() {
         let c = [0.3, -1.0, 2.0, 0.7, -1.5, 0.4];
-        let value = |t: f64| super::value(&c, t);
-        let slope = |t: f64| super::slope(&c, t);
+        let value = |t: f64| value(&c, t);
+        let slope = |t: f64| slope(&c, t);
         assert!((value(0.5) - (0.3 - 0.5 + 0.5 + 0.0875 - 0.09375 + 0.0125)).abs() < 1e-12);
         assert!((slope(0.5) - (-1.0 + 2.0 + 0.525 - 0.75 + 0.125)).abs() < 1e-12);
         let length = 0.25;
