@@ -19,8 +19,8 @@ import numpy as np
 
 # Nodes of a stroke, and the least number of a line.
 NODES, LEAST = 140, 3
-# Speed of the first guess, mm/s.
-GENTLE = 8.0
+# Speeds of the first guess, mm/s: the next one where ipopt gets stuck.
+GUESSES = 8.0, 4.0, 16.0
 
 
 class Motors:
@@ -56,7 +56,7 @@ class Motors:
         return self.coupling @ q / self.unit
 
 
-def solve(motors, points, tolerance, build_up):
+def solve(motors, points, tolerance, build_up, gentle):
     lines = np.diff(points, axis=0)
     lengths = np.hypot(lines[:, 0], lines[:, 1])
     counts = [max(LEAST, math.ceil(NODES * length / lengths.sum())) for length in lengths]
@@ -74,7 +74,7 @@ def solve(motors, points, tolerance, build_up):
             p = points[k] + lines[k] * (i / count)
             guess_m[:, first[k] + i] = motors.at(p)
             ahead = motors.at(p + 1e-4 * direction[k])
-            guess_v[:, first[k] + i] = (ahead - guess_m[:, first[k] + i]) / 1e-4 * GENTLE
+            guess_v[:, first[k] + i] = (ahead - guess_m[:, first[k] + i]) / 1e-4 * gentle
     guess_m[:, total] = motors.at(points[-1])
     guess_v[:, 0] = 0.0
 
@@ -130,7 +130,7 @@ def solve(motors, points, tolerance, build_up):
     unknowns = ca.vertcat(ca.vec(m), ca.vec(v), ca.vec(a), ca.vec(j), steps)
     guess = np.concatenate(
         [guess_m.T.ravel(), guess_v.T.ravel(), np.zeros(a.numel() + j.numel())]
-        + [np.maximum(lengths / GENTLE / counts, 1e-4)]
+        + [np.maximum(lengths / gentle / counts, 1e-4)]
     )
     lowest = np.full(len(guess), -np.inf)
     lowest[-len(counts) :] = 1e-6
@@ -164,7 +164,11 @@ def main():
         points = np.array(problem["points_mm"])
         motors = Motors(problem["machine"])
         ms = problem["build_up_ms"]
-        seconds, off, status, nodes = solve(motors, points, problem["tolerance_mm"], 1e-3 * ms)
+        for gentle in GUESSES:
+            found = solve(motors, points, problem["tolerance_mm"], 1e-3 * ms, gentle)
+            if found[2] == "Solve_Succeeded":
+                break
+        seconds, off, status, nodes = found
         fields = (problem["machine"]["name"], problem["stroke"], ms, f"{seconds:.5f}", f"{off:.4f}", status, nodes)
         print(*fields, sep="\t", flush=True)
 
