@@ -72,6 +72,7 @@ fn plans_over_the_sheet_are_certified() {
             lift_overlap_s: 0.0,
             timing_law: TimingLaw::default(),
             rounding: planner::Rounding::Path,
+            joint_fit: true,
             allow_over_limit: false,
         };
         let compiled = compile(&drawing, &machine, &request, &|_| ());
