@@ -35,10 +35,11 @@ export function rowAt(times, t) {
 /**
  * @param {Float64Array} t @param {Float64Array} pens @param {[Float64Array, Float64Array]} q
  * @param {(a: number, b: number, out: Float64Array) => void} position  of the pen
- * @param {boolean} inTicks  whether the machine moves in whole ticks
+ * @param {[Float64Array, Float64Array] | null} off  of a machine that moves in whole ticks: how far those
+ *   are from the nearest ones; empty where they are those
  * @returns {Track}
  */
-export function track(t, pens, q, position, inTicks) {
+export function track(t, pens, q, position, off) {
   const count = t.length;
   const x = new Float32Array(count);
   const y = new Float32Array(count);
@@ -49,7 +50,7 @@ export function track(t, pens, q, position, inTicks) {
   for (let row = 0; row < count; row++) {
     const a = q[0][row];
     const b = q[1][row];
-    if (inTicks) position(Math.floor(a + 0.5), Math.floor(b + 0.5), at);
+    if (off) position(Math.floor(a + 0.5) + (off[0][row] ?? 0), Math.floor(b + 0.5) + (off[1][row] ?? 0), at);
     else position(a, b, at);
     x[row] = at[0];
     y[row] = at[1];

@@ -185,6 +185,7 @@ fn plan_facts(plan: &PlanFile) -> Facts {
     add("machine.name", header.machine.clone());
     add("period_us", header.period_us.to_string());
     add("lift_overlap_us", header.lift_overlap_us.to_string());
+    add("rounding", header.rounding.name().to_owned());
     add("placement", format!("{:?}", header.placement));
     for (index, motor) in header.motors.iter().enumerate() {
         facts.extend(limit_facts(index, &motor.name, &motor.limits));
@@ -216,7 +217,7 @@ const PROGRAM: &str = "settings.program";
 
 /// Whether other keys of a plan document or of a machine file explain this one.
 fn follows_from_others(key: &str) -> bool {
-    let of_header = ["placement", "period_us", "lift_overlap_us", "settings.command_line"];
+    let of_header = ["placement", "period_us", "lift_overlap_us", "rounding", "settings.command_line"];
     key.starts_with("motor.") || of_header.contains(&key)
 }
 

@@ -189,7 +189,19 @@ impl View<'_> {
                 None => self.rows.iter().map(|row| row.ticks[motor]).collect(),
                 Some(exact) => {
                     let pairs = self.rows.iter().zip(exact);
-                    pairs.map(|(row, exact)| fixed_point(row.ticks[motor], exact[motor], bits)).collect()
+                    let nearest: Vec<(i64, f64)> = pairs
+                        .map(|(row, exact)| (nearest(row.ticks[motor], exact[motor]), exact[motor]))
+                        .collect();
+                    let off: Vec<i64> = self
+                        .rows
+                        .iter()
+                        .zip(&nearest)
+                        .map(|(row, (nearest, _))| row.ticks[motor] - nearest)
+                        .collect();
+                    if off.iter().any(|off| *off != 0) {
+                        columns.numbers(["off_a", "off_b"][motor], &off);
+                    }
+                    nearest.into_iter().map(|(ticks, exact)| fixed_point(ticks, exact, bits)).collect()
                 }
             };
             columns.numbers(name, &positions);
@@ -273,8 +285,13 @@ impl View<'_> {
     }
 }
 
-/// A position in steps of `2^-bits` ticks, rounded down, so that `floor(position + 0.5)` is the row's
-/// whole tick.
+/// The nearest tick to an exact position: the row's own, where it is one of two.
+fn nearest(ticks: i64, exact: f64) -> i64 {
+    if (ticks as f64 - exact).abs() <= 0.5 { ticks } else { exact.round() as i64 }
+}
+
+/// A position in steps of `2^-bits` ticks, rounded down, so that `floor(position + 0.5)` is the nearest
+/// whole tick. A row that is rounded along the path has its distance from that tick in another column.
 fn fixed_point(ticks: i64, exact: f64, bits: i32) -> i64 {
     let one = 1i64 << bits;
     let half = one >> 1;
