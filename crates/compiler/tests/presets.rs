@@ -130,3 +130,22 @@ fn dexterity_of_zero_is_refused() {
     assert!(error.contains("min_dexterity must be at least 0.001") && error.contains("singular"), "{error}");
     arm("0.001").unwrap().check_point(Point::new(0.0, 461.99)).unwrap();
 }
+
+#[test]
+fn workspace_report_suggests_a_start_and_doubts_limits() {
+    let arm = compiler::report::WorkspaceReport::of(&preset("coaxial"));
+    assert!(arm.start_manipulability < 1e-6, "straight up is stretched");
+    assert!(arm.suggested_start_mm.is_some());
+    assert!(arm.doubts.is_empty(), "{:?}", arm.doubts);
+    let [least, median, greatest] = arm.tick_floor_mm.expect("the sheet is within reach");
+    assert!(least < median && median < greatest && greatest < 0.4537);
+    let mut parts = preset("coaxial").parts().clone();
+    parts.motors[0].max_acceleration_ticks_s2 = 50.0;
+    parts.motors[1].max_speed_ticks_s = 20.0;
+    let doubts = compiler::report::WorkspaceReport::of(&Machine::new(parts).expect("a machine")).doubts;
+    assert_eq!(doubts.len(), 3, "{doubts:?}");
+    assert!(doubts[0].contains("10.7 s") && doubts[2].contains("less than its max_speed"), "{doubts:?}");
+    let corexy = compiler::report::WorkspaceReport::of(&preset("corexy"));
+    assert_eq!(corexy.suggested_start_mm, None);
+    assert_eq!(corexy.reach_mm, Some([0.0, 0.0, 200.0, 200.0]));
+}

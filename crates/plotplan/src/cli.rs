@@ -506,6 +506,9 @@ pub(crate) enum Machine {
         /// Machine file, or the name of a preset
         #[arg(value_parser = name())]
         file: String,
+        /// Also write a picture of it, as `machine preview` does: NAME.svg or NAME.png
+        #[arg(short, long, value_name = "OUT", value_parser = name())]
+        output: Option<String>,
     },
     /// Draw a picture of a machine: reach, sheet, start pose, and its resolution as shades
     Preview {

@@ -1,7 +1,7 @@
 //! Machines.
 
-use drawing::{Line, Point, Rect, Segment};
-use kinematics::Machine;
+use drawing::{Line, Point, Rect, Segment, Vec2};
+use kinematics::{Machine, reach_outlines};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -22,12 +22,31 @@ pub struct MachineReport {
     /// Quantization error in the middle of the sheet (half a tick on both motors), mm; `null` if the
     /// middle is out of reach.
     pub tick_floor_mm: Option<f64>,
+    /// What `machine check` looks into besides; else `null`.
+    pub workspace: Option<WorkspaceReport>,
     /// The sheet and how much of it can be drawn on.
     pub sheet: SheetReport,
     /// Whether the machine can draw the drawing, from `check` with a machine; else `null`.
     pub can_draw: Option<bool>,
     /// How far ink reaches beyond the sheet, mm; from `check` with a machine, else `null`.
     pub beyond_sheet_mm: Option<f64>,
+}
+
+/// The reach of a machine, its resolution over the sheet, and what to look at.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct WorkspaceReport {
+    /// Left, bottom, right and top end of the reach, mm; `null` where nothing bounds it.
+    pub reach_mm: Option<[f64; 4]>,
+    /// Quantization error over the sheet, mm: least, median and greatest; `null` if none of it is
+    /// within reach.
+    pub tick_floor_mm: Option<[f64; 3]>,
+    /// Manipulability of the start pose.
+    pub start_manipulability: f64,
+    /// Where the pen could start instead, mm: of the sheet's edges and its middle the place farthest from a
+    /// singular pose; `null` if the start pose will do.
+    pub suggested_start_mm: Option<[f64; 2]>,
+    /// Limits that make no sense, in sentences.
+    pub doubts: Vec<String>,
 }
 
 /// A motor: `ticks = counts * (matrix row * joints) + offset`.
@@ -108,11 +127,103 @@ impl MachineReport {
             motors: motors.collect(),
             start_ticks: [start[0].round() as i64, start[1].round() as i64],
             tick_floor_mm: middle.map(|pose| round::mm(machine.quantization_error(&pose))),
+            workspace: None,
             sheet: SheetReport::of(machine),
             can_draw: None,
             beyond_sheet_mm: None,
         }
     }
+}
+
+impl WorkspaceReport {
+    /// The workspace of a machine.
+    pub fn of(machine: &Machine) -> Self {
+        let points: Vec<Point> = reach_outlines(machine).into_iter().flatten().collect();
+        let most = |of: fn(f64, f64) -> f64, at: fn(&Point) -> f64| points.iter().map(at).reduce(of);
+        let reach = (most(f64::min, |p| p.x), most(f64::min, |p| p.y), most(f64::max, |p| p.x));
+        let reach_mm = match (reach, most(f64::max, |p| p.y)) {
+            ((Some(x0), Some(y0), Some(x1)), Some(y1)) => Some([x0, y0, x1, y1].map(round::mm)),
+            _ => None,
+        };
+        let sheet = machine.sheet();
+        let share = |k: i32| f64::from(k) / 20.0;
+        let grid = (0..21 * 21).map(|k| {
+            Point::new(sheet.x0 + share(k % 21) * sheet.width(), sheet.y0 + share(k / 21) * sheet.height())
+        });
+        let pose = |p: Point| {
+            machine.check_point(p).ok()?;
+            machine.pose_near(p, &machine.start()).ok()
+        };
+        let mut floors: Vec<f64> =
+            grid.filter_map(pose).map(|pose| machine.quantization_error(&pose)).collect();
+        floors.sort_by(f64::total_cmp);
+        let floor = |share: f64| floors[((floors.len() - 1) as f64 * share) as usize];
+        let tick_floor_mm = (!floors.is_empty()).then(|| [floor(0.0), floor(0.5), floor(1.0)].map(round::mm));
+        let manipulability = |p: Point| pose(p).map_or(0.0, |pose| machine.mechanism().manipulability(&pose));
+        let start_manipulability = machine.mechanism().manipulability(&machine.start());
+        let middle = sheet.center();
+        let edges = [
+            (middle.x, sheet.y0),
+            (sheet.x0, sheet.y0),
+            (sheet.x1, sheet.y0),
+            (sheet.x0, middle.y),
+            (sheet.x1, middle.y),
+            (middle.x, sheet.y1),
+            (middle.x, middle.y),
+        ];
+        let best = edges.map(Point::from).into_iter().reduce(|best, other| {
+            if manipulability(other) > manipulability(best) + 1e-3 { other } else { best }
+        });
+        let poor = start_manipulability < machine.parts().min_manipulability;
+        let suggested = best.filter(|best| poor && manipulability(*best) > start_manipulability);
+        Self {
+            reach_mm,
+            tick_floor_mm,
+            start_manipulability: round::coefficient(start_manipulability),
+            suggested_start_mm: suggested.map(|start| [start.x, start.y].map(round::mm)),
+            doubts: doubts(machine),
+        }
+    }
+}
+
+/// Limits that can hardly be meant.
+fn doubts(machine: &Machine) -> Vec<String> {
+    let mut doubts = Vec::new();
+    for motor in machine.motors() {
+        let (name, speed) = (&motor.name, motor.max_speed_ticks_s);
+        let time_s = speed / motor.max_acceleration_ticks_s2;
+        if time_s > 5.0 {
+            doubts.push(format!("motor {name} takes {time_s:.1} s to reach its largest speed"));
+        }
+        if time_s < 1e-3 {
+            doubts.push(format!("motor {name} reaches its largest speed within {:.2} ms", 1e3 * time_s));
+        }
+        if speed * machine.parts().period_s < 1.0 {
+            doubts.push(format!("motor {name} moves by less than a tick between two rows"));
+        }
+        if speed > 2e6 {
+            doubts.push(format!("motor {name} takes {speed:.0} ticks/s, more than a controller gives"));
+        }
+    }
+    let middle = machine.sheet().center();
+    if let Ok(pose) = machine.pose_near(middle, &machine.start()) {
+        let fastest = (0..36)
+            .map(|k| {
+                let (sin, cos) = libm::sincos(f64::from(k) * std::f64::consts::TAU / 36.0);
+                let (rates, _) = machine.motor_derivatives(&pose, Vec2::new(cos, sin), Vec2::ZERO);
+                let limits = machine.motors().each_ref().map(|motor| motor.max_speed_ticks_s);
+                (limits[0] / rates[0].abs()).min(limits[1] / rates[1].abs())
+            })
+            .fold(0.0, f64::max);
+        let pen = machine.pen().max_speed_mm_s;
+        if fastest < pen {
+            doubts.push(format!(
+                "the motors move the pen by at most {fastest:.1} mm/s in the middle of the sheet, less than its \
+                 max_speed of {pen:.1} mm/s"
+            ));
+        }
+    }
+    doubts
 }
 
 impl SheetReport {

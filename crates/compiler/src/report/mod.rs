@@ -28,7 +28,9 @@ pub use self::diff::{CauseReport, DiffReport, QuantityReport, StrokesReport};
 pub use self::input::{
     DrawingReport, FactReport, MotorLimits, PageReport, PenReport, PlanReport, ProgramReport,
 };
-pub use self::machine::{ListedMachine, MachineMotor, MachineReport, MachineSource, SheetReport};
+pub use self::machine::{
+    ListedMachine, MachineMotor, MachineReport, MachineSource, SheetReport, WorkspaceReport,
+};
 pub use self::sending::{SendEnd, SendReport, SendUnit};
 pub use self::summary::{Ordering, Summary};
 

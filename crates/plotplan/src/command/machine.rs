@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use compiler::report::{Code, MachineReport, MachineSource};
+use compiler::report::{Code, MachineReport, MachineSource, WorkspaceReport};
 
 use super::firmware_config;
 use crate::cli::Machine;
@@ -23,7 +23,13 @@ pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
             let text = machines::machine_toml(name)?;
             output::write("-", |out| out.write_all(text.as_bytes()))
         }
-        Machine::Check { file } => output::report(&check(file)?),
+        Machine::Check { file, output } => {
+            let text = check(file)?;
+            if let Some(to) = output {
+                super::preview::machine(file, to, None)?;
+            }
+            output::report(&text)
+        }
         Machine::Preview { name, output, format } => super::preview::machine(name, output, *format),
     }
 }
@@ -49,10 +55,35 @@ fn list() -> String {
     text
 }
 
+/// Reach, resolution over the sheet, start pose, and doubtful limits.
+fn describe(workspace: &WorkspaceReport, text: &mut String) {
+    if let Some([least, median, greatest]) = workspace.tick_floor_mm {
+        let _ = writeln!(
+            text,
+            "tick floor over the sheet: {least:.4} to {greatest:.4} mm, median {median:.4} mm"
+        );
+    }
+    if let Some([x0, y0, x1, y1]) = workspace.reach_mm {
+        let _ = writeln!(text, "reach {x0:.1}, {y0:.1} to {x1:.1}, {y1:.1} mm");
+    }
+    if let Some([x, y]) = workspace.suggested_start_mm {
+        let _ = writeln!(
+            text,
+            "the start pose is singular (manipulability {:.3}): an error in it is hard to see and large at the pen; \
+             [start] x = \"{x}mm\", y = \"{y}mm\" is better",
+            workspace.start_manipulability
+        );
+    }
+    for doubt in &workspace.doubts {
+        let _ = writeln!(text, "is this meant? {doubt}");
+    }
+}
+
 fn check(file: &str) -> Result<String, Failure> {
     session::report(|report| report.inputs.push(file.to_owned()));
     let machine = machines::machine(file)?.machine;
-    let report = MachineReport::of(&machine);
+    let workspace = WorkspaceReport::of(&machine);
+    let report = MachineReport { workspace: Some(workspace.clone()), ..MachineReport::of(&machine) };
     let mut text = format!("{} is valid\n", report.name);
     for motor in &report.motors {
         let _ = write!(
@@ -77,6 +108,7 @@ fn check(file: &str) -> Result<String, Failure> {
     if let Some(floor) = report.tick_floor_mm {
         let _ = writeln!(text, "tick floor in the middle of the sheet: {floor:.4} mm");
     }
+    describe(&workspace, &mut text);
     for edge in &report.sheet.unreached_edges {
         terminal::warning(Code::SheetNotReached, edge);
     }
