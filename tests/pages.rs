@@ -108,3 +108,68 @@ fn page_needs_a_machine_that_moves() {
     }
     assert!(!dir.path().join("x.html").exists());
 }
+
+#[test]
+fn pictures_color_ink_by_a_quantity_and_show_the_machine() {
+    let dir = TempDir::new().unwrap();
+    let svg = |words: &str| {
+        let output = run(&dir, &format!("preview examples/zot.hpgl --machine coaxial -q -o x.svg {words}"));
+        assert!(output.status.success(), "{words}: {}", String::from_utf8_lossy(&output.stderr));
+        fs::read_to_string(dir.path().join("x.svg")).unwrap()
+    };
+    for (words, texts) in [
+        ("--color speed", [">pen speed<", ">0.0 mm/s<", ">60.0 mm/s<"]),
+        ("--color-by=limit", [">what limits the pen<", ">the pen's speed<", ">acceleration of arm1<"]),
+        ("--color deviation", [">distance from the drawing<", ">0.000 mm<", " mm<"]),
+        ("--color order", [">order<", ">0.0 s<", " s<"]),
+    ] {
+        let picture = svg(words);
+        assert!(picture.matches("class=\"colored\"").count() > 1, "{words}");
+        for text in texts {
+            assert!(picture.contains(text), "{words}: {text}");
+        }
+    }
+    let posed = svg("--at 6s --color pen");
+    assert!(
+        posed.contains("id=\"machine\"")
+            && posed.contains("class=\"ahead\"")
+            && posed.contains("id=\"pen1\"")
+    );
+    assert_eq!(posed.matches("<circle").count(), 3, "base, elbow and pen");
+    assert_ne!(posed, svg("--at 7s --color pen"));
+    let moving = svg("--animate 9s");
+    assert!(moving.contains("dur=\"9.000s\" repeatCount=\"indefinite\"") && moving.len() < 1_000_000);
+    assert_eq!(moving, svg("--animate 9s"));
+
+    let made = run(&dir, "convert examples/zot.hpgl --machine coaxial -o plan.ticks -q");
+    assert!(made.status.success());
+    let refused = run(&dir, "preview plan.ticks --color deviation -o y.svg");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("does not hold its drawing"));
+    assert!(run(&dir, "preview plan.ticks --color limit --at 3s -o y.png").status.success());
+}
+
+#[test]
+fn ink_out_of_reach_is_red() {
+    let dir = TempDir::new().unwrap();
+    fs::write(dir.path().join("wide.hpgl"), "IN;SP1;PU4000,4000;PD20000,4000;PU;").unwrap();
+    let picture = |words: &str| {
+        assert!(run(&dir, &format!("preview {words} --machine hbot -q -o x.svg")).status.success());
+        fs::read_to_string(dir.path().join("x.svg")).unwrap()
+    };
+    let wide = picture("wide.hpgl");
+    assert!(wide.contains("stroke=\"#d00020\"") && wide.contains(">out of reach<"));
+    assert!(!picture("examples/zot.hpgl --fit").contains("out of reach"));
+}
+
+#[test]
+fn text_preview_is_braille() {
+    let dir = TempDir::new().unwrap();
+    let output = run(&dir, "preview examples/house.hpgl --paper a4 --fit -q --format text");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.lines().count() > 20 && text.lines().all(|line| line.chars().count() <= 80));
+    assert!(text.chars().all(|c| c == '\n' || ('\u{2800}'..='\u{28ff}').contains(&c)));
+    // Where standard output is no terminal, a picture goes there.
+    let piped = run(&dir, "preview examples/house.hpgl --paper a4 --fit -q").stdout;
+    assert!(piped.starts_with(b"<svg"));
+}

@@ -158,7 +158,7 @@ export function strokePanel(panel, view, stroke, at) {
       row("to", `${rows.x[last].toFixed(2)}, ${rows.y[last].toFixed(2)} mm`),
     ),
   ];
-  if (view.limits) {
+  if (view.limits && mm > 0) {
     const by = new Map();
     for (let k = first; k < last; k++) {
       const index = view.binds(k);

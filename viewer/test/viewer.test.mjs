@@ -248,6 +248,16 @@ test("tabs and picture by keyboard alone", () => onPage("house.html", {}, async 
   for (const id of ["measure", "color", "front", "play", "rate", "scrubber", "next"]) assert.ok(reached.has(id), id);
 }));
 
+test("prints picture, certificate and times", () => onPage("house.html", { hash: "#t=40" }, async (page) => {
+  await page.click("#tab-stroke");
+  await page.emulateMedia({ media: "print" });
+  await settled(page);
+  const stage = await page.locator("#stage").boundingBox();
+  assert.ok(stage.height > 300 && stage.width > 300, JSON.stringify(stage));
+  assert.ok(await page.locator("#panel-plan").isVisible());
+  for (const hidden of [".tools", ".player", ".strips", ".tabs"]) assert.ok(await page.locator(hidden).isHidden(), hidden);
+}));
+
 test("axe-core finds nothing", async () => {
   for (const scheme of ["light", "dark"]) {
     for (const [width, height] of [[1280, 800], [360, 740]]) {

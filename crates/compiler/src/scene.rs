@@ -2,11 +2,12 @@
 
 use drawing::{Drawing, Point, Rect};
 use kinematics::{Machine, reach_outlines};
-use picture::{Ink, InkLine, LEVELS, PenColors, Scene, Shades};
+use picture::{BEYOND, ColoredLine, Ink, InkLine, Key, KeyColors, LEVELS, Overlay, PenColors, Scene, Shades};
 use plan::Row;
 
 use crate::import::Page;
 use crate::replay::{Motion, Polyline};
+use crate::view::label;
 
 /// Chords of the motion between two rows of a plan deviate from it by at most this, mm.
 const CHORD_MM: f64 = 0.02;
@@ -20,7 +21,45 @@ pub fn of_drawing(title: &str, drawing: &Drawing, sheet: Option<Rect>, colors: P
 /// A placed drawing on its machine, in the file's order, with straight travel.
 pub fn of_placed(title: &str, drawing: &Drawing, machine: &Machine, colors: PenColors) -> Scene {
     let start = Some(start_point(machine));
-    Scene { colors, ..scene(title, machine.sheet(), reach_outlines(machine), drawing, start) }
+    let lines = beyond_reach(drawing, machine);
+    let key = (!lines.is_empty()).then(|| Key {
+        title: label("what the machine cannot draw"),
+        colors: KeyColors::Kinds(vec![(BEYOND, label("out of reach"))]),
+    });
+    let overlay = Overlay { lines, key, ..Overlay::default() };
+    Scene { colors, overlay, ..scene(title, machine.sheet(), reach_outlines(machine), drawing, start) }
+}
+
+/// The parts of a drawing that the machine cannot draw, in steps of 0.5 mm.
+fn beyond_reach(drawing: &Drawing, machine: &Machine) -> Vec<ColoredLine> {
+    const STEP_MM: f64 = 0.5;
+    let is_beyond = |point: Point| machine.check_point(point).is_err();
+    let mut lines = Vec::new();
+    for stroke in &drawing.strokes {
+        let is_inside = !is_beyond(stroke.start())
+            && stroke.segments().all(|segment| machine.check_segment(&segment).is_ok());
+        if is_inside {
+            continue;
+        }
+        let mut line: Vec<Point> = Vec::new();
+        let points = stroke.flatten(CHORD_MM);
+        let mut add = |point: Point| {
+            if is_beyond(point) {
+                line.push(point);
+            } else if !line.is_empty() {
+                lines.push(ColoredLine { color: BEYOND, points: std::mem::take(&mut line) });
+            }
+        };
+        add(points[0]);
+        for pair in points.windows(2) {
+            let steps = (drawing::distance(pair[0], pair[1]) / STEP_MM).ceil().clamp(1.0, 1e5);
+            (1..=steps as u32).for_each(|step| add(pair[0].lerp(pair[1], f64::from(step) / steps)));
+        }
+        if !line.is_empty() {
+            lines.push(ColoredLine { color: BEYOND, points: line });
+        }
+    }
+    lines
 }
 
 /// The colours that a file gives its pens.
@@ -44,6 +83,7 @@ pub fn of_plan(title: &str, rows: &[Row], machine: &Machine, colors: PenColors) 
         colors,
         travel: travel.into_iter().map(|line| line.points).collect(),
         start: Some(start_point(machine)),
+        overlay: Overlay::default(),
     }
 }
 
@@ -59,6 +99,7 @@ pub fn of_machine(machine: &Machine) -> Scene {
         colors: PenColors::new(),
         travel: Vec::new(),
         start: Some(start_point(machine)),
+        overlay: Overlay::default(),
     }
 }
 
@@ -74,6 +115,7 @@ pub fn of_ink(title: &str, lines: Vec<(u16, Vec<Point>)>, drawing: &Drawing, mac
         colors: PenColors::new(),
         travel: Vec::new(),
         start: Some(start_point(machine)),
+        overlay: Overlay::default(),
     }
 }
 
@@ -141,5 +183,6 @@ fn scene(title: &str, sheet: Rect, reach: Vec<Vec<Point>>, drawing: &Drawing, st
         colors: PenColors::new(),
         travel,
         start,
+        overlay: Overlay::default(),
     }
 }

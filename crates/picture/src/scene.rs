@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use drawing::{Point, Rect, Stroke};
 
+use crate::overlay::{AHEAD, Key, KeyColors, LINK, MachinePose, Overlay, RAIL};
 use crate::palette::{Colour, PenColors, colour_on_white, hex};
 use crate::svg::{path, point, polyline, view_box};
 use plan::file::text::Text;
@@ -45,6 +46,8 @@ pub struct Scene {
     pub travel: Vec<Vec<Point>>,
     /// Where the pen starts.
     pub start: Option<Point>,
+    /// Colours of its own, and the machine.
+    pub overlay: Overlay,
 }
 
 /// One connected line of ink.
@@ -109,7 +112,11 @@ impl Scene {
                 vec![Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)]
             }
         });
-        let others = self.travel.iter().chain(&self.reference).flatten().chain(&self.start).copied();
+        let Overlay { ahead, lines, machine, .. } = &self.overlay;
+        let lines = lines.iter().map(|line| &line.points).chain(ahead);
+        let others =
+            self.travel.iter().chain(&self.reference).chain(lines).flatten().chain(&self.start).copied();
+        let others = others.chain(machine.iter().flat_map(MachinePose::points));
         let points = ink.chain(others).filter(|point| point.is_finite());
         let bounds = points.fold(self.sheet.abs(), |bounds, point| bounds.union_pt(point));
         let cells = self.shades.iter().flat_map(|shades| &shades.cells);
@@ -164,6 +171,7 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
         }
         text.str("\"/>\n");
     }
+    write_lines(&mut text, "ahead", AHEAD, scene.overlay.ahead.iter())?;
     for pen in scene.pens() {
         text.str("<g id=\"pen").int(pen).str("\" stroke=\"").str(&hex(colour_on_white(pen, &scene.colors)));
         text.str("\" stroke-width=\"").fixed(INK_MM).str("\">\n");
@@ -177,6 +185,13 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
         }
         text.str("</g>\n");
     }
+    for color in colors_of(&scene.overlay) {
+        let lines = scene.overlay.lines.iter().filter(|line| line.color == color);
+        write_lines(&mut text, "colored", color, lines.map(|line| &line.points))?;
+    }
+    if let Some(machine) = &scene.overlay.machine {
+        write_machine(&mut text, machine, scene);
+    }
     if let Some(start) = scene.start {
         text.str("<path id=\"start\" stroke=\"").str(&hex(START)).str("\" stroke-width=\"").fixed(OUTLINE_MM);
         text.str("\" d=\"");
@@ -186,6 +201,63 @@ pub fn svg<W: Write + ?Sized>(scene: &Scene, out: &mut W) -> io::Result<()> {
     legend.write(&mut text, scene, bounds);
     text.str("</svg>\n");
     text.finish()
+}
+
+/// The colours of lines, each once, in the order of their first use.
+pub(crate) fn colors_of(overlay: &Overlay) -> Vec<Colour> {
+    let mut colors = Vec::new();
+    for line in &overlay.lines {
+        if !colors.contains(&line.color) {
+            colors.push(line.color);
+        }
+    }
+    colors
+}
+
+/// Lines of one colour as one path; nothing if there are none.
+fn write_lines<'a, W: Write + ?Sized>(
+    text: &mut Text<'_, W>,
+    class: &str,
+    color: Colour,
+    lines: impl Iterator<Item = &'a Vec<Point>>,
+) -> io::Result<()> {
+    let mut lines = lines.peekable();
+    if lines.peek().is_none() {
+        return Ok(());
+    }
+    text.str("<path class=\"").str(class).str("\" stroke=\"").str(&hex(color));
+    text.str("\" stroke-width=\"").fixed(INK_MM).str("\" d=\"");
+    for line in lines {
+        polyline(text, line)?;
+    }
+    text.str("\"/>\n");
+    Ok(())
+}
+
+/// The width of a machine's links, mm: a share of the sheet.
+pub(crate) fn link_mm(scene: &Scene) -> f64 {
+    scene.sheet.width().abs().max(scene.sheet.height().abs()) / 75.0
+}
+
+fn write_machine<W: Write + ?Sized>(text: &mut Text<'_, W>, machine: &MachinePose, scene: &Scene) {
+    let width = link_mm(scene);
+    text.str("<g id=\"machine\" opacity=\"0.800\">\n");
+    let rails = machine.rails.iter().map(|ends| (ends, RAIL, 0.5 * width));
+    for (ends, color, width) in rails.chain(machine.links.iter().map(|ends| (ends, LINK, width))) {
+        text.str("<path stroke=\"").str(&hex(color)).str("\" stroke-width=\"").fixed(width).str("\" d=\"M");
+        point(text, ends[0]);
+        text.byte(b'L');
+        point(text, ends[1]);
+        text.str("\"/>\n");
+    }
+    let pen = machine.is_down.map_or([0xFF; 3], |pen| colour_on_white(pen, &scene.colors));
+    let pivots = machine.pivots.iter().map(|at| (*at, 0.8 * width, [0xFF; 3], LINK));
+    for (at, radius, fill, line) in pivots.chain([(machine.pen, 0.6 * width, pen, START)]) {
+        text.str("<circle cx=\"").fixed(at.x).str("\" cy=\"").fixed(-at.y).str("\" r=\"").fixed(radius);
+        text.str("\" fill=\"").str(&hex(fill)).str("\" stroke=\"").str(&hex(line)).str("\" stroke-width=\"");
+        text.fixed(0.3 * width).str("\"/>\n");
+    }
+    text.str("</g>\n");
 }
 
 /// The cells, one path a level.
@@ -219,7 +291,9 @@ impl Legend {
         // A pen's entry is six letters wide with its line of colour.
         let pens_a_line = (bounds.width() / (6.0 * size_mm)).floor().max(1.0) as usize;
         let shades = usize::from(scene.shades.is_some());
-        Self { size_mm, pens_a_line, lines: 2 + shades + scene.pens().len().div_ceil(pens_a_line) }
+        let pens = scene.pens().len().div_ceil(pens_a_line);
+        let key = scene.overlay.key.as_ref().map_or(0, key_lines);
+        Self { size_mm, pens_a_line, lines: 2 + shades + pens + key }
     }
 
     fn height_mm(&self) -> f64 {
@@ -256,7 +330,42 @@ impl Legend {
             label(text, at + (1.7 * self.size_mm, 0.0));
             text.str("pen ").int(pen).str("</text>\n");
         }
+        if let Some(key) = &scene.overlay.key {
+            let first = self.lines - key_lines(key) + 1;
+            self.write_key(text, key, |index| Point::new(left, line(first + index)));
+        }
         text.str("</g>\n");
+    }
+
+    /// The key: its title, then a line for each colour, or one with the scale.
+    fn write_key<W: Write + ?Sized>(&self, text: &mut Text<'_, W>, key: &Key, line: impl Fn(usize) -> Point) {
+        let size = self.size_mm;
+        write_words(text, line(0), &key.title.text);
+        match &key.colors {
+            KeyColors::Kinds(kinds) => {
+                for (index, (color, meaning)) in kinds.iter().enumerate() {
+                    let at = line(1 + index);
+                    text.str("<path stroke=\"").str(&hex(*color)).str("\" stroke-width=\"").fixed(0.3 * size);
+                    text.str("\" d=\"M");
+                    point(text, at + (0.0, 0.3 * size));
+                    text.byte(b'h').fixed(1.2 * size).str("\"/>\n");
+                    write_words(text, at + (1.7 * size, 0.0), &meaning.text);
+                }
+            }
+            KeyColors::Scale { colors, ends } => {
+                let start = line(1) + (KEY_START * size, 0.0);
+                let width = KEY_WIDTH * size / colors.len() as f64;
+                for (index, color) in colors.iter().enumerate() {
+                    text.str("<rect fill=\"").str(&hex(*color)).str("\"");
+                    let corner = start + (width * index as f64, 0.0);
+                    // A little wider, so that no gap shows between neighbours.
+                    rectangle(text, Rect::from_points(corner, corner + (1.05 * width, 0.8 * size)));
+                    text.str("/>\n");
+                }
+                write_words(text, line(1), &ends[0].text);
+                write_words(text, start + (KEY_WIDTH * size + 0.7 * size, 0.0), &ends[1].text);
+            }
+        }
     }
 
     /// The levels as a row of squares, between the smallest and the largest value.
@@ -274,11 +383,29 @@ impl Legend {
     }
 }
 
+/// Where the scale of a key begins, and its width, in heights of letters.
+pub(crate) const KEY_START: f64 = 6.0;
+pub(crate) const KEY_WIDTH: f64 = 16.0;
+
+/// Lines of text of a key.
+pub(crate) fn key_lines(key: &Key) -> usize {
+    match &key.colors {
+        KeyColors::Kinds(kinds) => 1 + kinds.len(),
+        KeyColors::Scale { .. } => 2,
+    }
+}
+
+fn write_words<W: Write + ?Sized>(text: &mut Text<'_, W>, at: Point, words: &str) {
+    label(text, at);
+    escaped(text, words);
+    text.str("</text>\n");
+}
+
 fn label<W: Write + ?Sized>(text: &mut Text<'_, W>, at: Point) {
     text.str("<text x=\"").fixed(at.x).str("\" y=\"").fixed(-at.y).str("\">");
 }
 
-fn rectangle<W: Write + ?Sized>(text: &mut Text<'_, W>, rect: Rect) {
+pub(crate) fn rectangle<W: Write + ?Sized>(text: &mut Text<'_, W>, rect: Rect) {
     text.str(" x=\"").fixed(rect.x0).str("\" y=\"").fixed(-rect.y1);
     text.str("\" width=\"").fixed(rect.width()).str("\" height=\"").fixed(rect.height()).byte(b'"');
 }
@@ -293,7 +420,7 @@ fn cross<W: Write + ?Sized>(text: &mut Text<'_, W>, at: Point, arm_mm: f64) {
 }
 
 /// Text for XML. Characters that XML cannot hold are left out.
-fn escaped<W: Write + ?Sized>(text: &mut Text<'_, W>, words: &str) {
+pub(crate) fn escaped<W: Write + ?Sized>(text: &mut Text<'_, W>, words: &str) {
     for letter in words.chars() {
         match letter {
             '&' => text.str("&amp;"),

@@ -2,6 +2,7 @@
 
 mod device;
 mod format;
+mod ink;
 mod project;
 mod reading;
 mod values;
@@ -15,6 +16,7 @@ use clap_complete::Shell;
 
 pub(crate) use device::{Emulate, Flow, PenLift, Send};
 pub(crate) use format::Format;
+pub(crate) use ink::{InkColor, with_ink_color};
 pub(crate) use project::{Build, Diff, Init};
 pub(crate) use reading::{PageChoice, Reading, TextForm};
 use values::{align, angle, length, name, pen, place, scale, ticks, time};
@@ -336,14 +338,23 @@ pub(crate) struct Preview {
     pub(crate) files: Vec<String>,
     /// Picture to write: NAME.svg or NAME.png, or NAME.html: the plan as it is drawn, in one page for the browser; `-` for
     /// standard output
-    #[arg(short, long, value_name = "OUT", value_parser = name())]
+    #[arg(short, long, value_name = "OUT", default_value = "-", value_parser = name())]
     pub(crate) output: String,
-    /// Format of the picture [default: by the extension of --output; svg on standard output]
+    /// Format of the picture [default: by the extension of --output; on standard output text for a terminal, else svg]
     #[arg(short, long, value_enum)]
     pub(crate) format: Option<PictureFormat>,
     /// The machine to show it on; a plan knows its own
     #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
+    /// Colour the ink of a plan by a quantity, with a legend (also --color)
+    #[arg(long, value_name = "WHAT", value_enum)]
+    pub(crate) color_by: Option<InkColor>,
+    /// Draw the machine in its pose at this time of the plan; ink that is to come is grey
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub(crate) at: Option<f64>,
+    /// SVG: draw the plan over and over, in this time
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with_all = ["at", "color_by"])]
+    pub(crate) animate: Option<f64>,
     #[command(flatten)]
     pub(crate) reading: Reading,
     #[command(flatten)]
@@ -359,6 +370,8 @@ pub(crate) enum PictureFormat {
     Png,
     /// A page for the browser that shows machine and pen in motion; it needs no network
     Html,
+    /// Braille characters, for a terminal
+    Text,
 }
 
 #[derive(Debug, Args)]

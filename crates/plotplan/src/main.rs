@@ -36,7 +36,7 @@ fn main() -> ExitCode {
         });
     }
     let parsed = command
-        .try_get_matches()
+        .try_get_matches_from(cli::with_ink_color(std::env::args_os()))
         .and_then(|matches| Ok((cli::Arguments::from_arg_matches(&matches)?, matches)));
     let (mut arguments, matches) = match parsed {
         Ok(parsed) => parsed,

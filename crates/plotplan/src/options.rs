@@ -33,6 +33,8 @@ const PLACEMENT: [&str; 8] = ["fit", "shrink", "align", "place", "scale", "rotat
 const ON_SHEET: [&str; 3] = ["fit", "shrink", "align"];
 /// Options of the ordering that `--order file` leaves out; `--effort 0` has an effect on paths too.
 const ORDERING: [&str; 3] = ["effort", "keep_direction", "pen_order"];
+/// Options of pictures of a plan.
+const MOVING: [&str; 3] = ["color_by", "at", "animate"];
 /// Options of the firmware's pen.
 const PEN: [&str; 2] = ["pen_by", "pen_positions"];
 /// Options of the reader of a drawing.
@@ -239,6 +241,9 @@ fn drawing(options: &Given<'_>) -> Option<String> {
 
 fn preview(options: &Given<'_>) -> Option<String> {
     if is_page(options) {
+        return options.refuse(&MOVING, "on a page, which shows all of it").or_else(|| planning(options));
+    }
+    if MOVING.iter().any(|id| options.has(id)) {
         return planning(options);
     }
     options
@@ -264,7 +269,10 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 38] = [
+    const VALUES: [(&str, Option<&str>); 41] = [
+        ("--color-by", Some("speed")),
+        ("--at", Some("2s")),
+        ("--animate", Some("9s")),
         ("--tolerance", Some("0.2mm")),
         ("--period", Some("20ms")),
         ("--order", Some("optimize")),
@@ -349,6 +357,7 @@ mod tests {
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "-mcorexy"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "--paper", "a4"]);
         row(&["plotplan", "preview", "x.hpgl", "-ox.html", "-mcorexy"]);
+        row(&["plotplan", "preview", "x.hpgl", "-ox.svg", "-mcorexy", "--at", "1s"]);
         row(&["plotplan", "simulate", "x.hpgl", "-mcoaxial"]);
         row(&["plotplan", "simulate", "-mcoaxial", "--step", "3200"]);
         row(&["plotplan", "tune", "-mcoaxial"]);

@@ -296,6 +296,18 @@ impl Window {
     }
 }
 
+/// Columns and lines of the terminal on standard output; 80 and 40 where there is none.
+pub(crate) fn size() -> (u32, u32) {
+    #[cfg(unix)]
+    if let Ok(size) = rustix::termios::tcgetwinsize(std::io::stdout())
+        && size.ws_col > 0
+        && size.ws_row > 0
+    {
+        return (size.ws_col.into(), size.ws_row.into());
+    }
+    (80, 40)
+}
+
 /// Progress of planning: step, percentage, time left. On a terminal only.
 pub(crate) struct Progress {
     bar: ProgressBar,

@@ -1,5 +1,7 @@
 //! Plans for the viewer: what `viewer::page` shows, from a plan, its machine and its drawing.
 
+mod motion;
+mod scenes;
 mod trace;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,6 +13,8 @@ use serde_json::{Value, json};
 use simulation::Sample;
 use viewer::Columns;
 
+pub use self::scenes::ColorBy;
+pub(crate) use self::scenes::label;
 use crate::import::PenSettings;
 use crate::report::simulation::SimulationReport;
 use crate::report::{CertificateReport, Finding, Summary};
@@ -225,6 +229,13 @@ impl View<'_> {
             .collect()
     }
 
+    /// The largest speed that the plan allows a pen, mm/s.
+    fn pen_speed_mm_s(&self, number: u16) -> f64 {
+        let speeds = self.drawing.as_ref().map_or(&[][..], |drawing| drawing.pen_speeds);
+        let own = speeds.iter().find(|(pen, _)| pen.0 == number).map_or(f64::INFINITY, |(_, speed)| *speed);
+        self.machine.pen().max_speed_mm_s.min(own)
+    }
+
     /// The pens that draw.
     fn pens(&self) -> Vec<Value> {
         let numbers: BTreeSet<u16> = self.rows.iter().map(|row| row.pen).filter(|pen| *pen != 0).collect();
@@ -237,15 +248,12 @@ impl View<'_> {
             .into_iter()
             .map(|number| {
                 let settings = stated(number).unwrap_or(&none);
-                let speeds = self.drawing.as_ref().map_or(&[][..], |drawing| drawing.pen_speeds);
-                let speed =
-                    speeds.iter().find(|(pen, _)| pen.0 == number).map_or(f64::INFINITY, |(_, speed)| *speed);
                 json!({
                     "number": number,
                     "color": picture::ink_color(number, &self.header.pen_colors),
                     "name": settings.name,
                     "width_mm": settings.width_mm.filter(|width| *width > 0.0 && *width < 20.0),
-                    "speed_mm_s": self.machine.pen().max_speed_mm_s.min(speed),
+                    "speed_mm_s": self.pen_speed_mm_s(number),
                 })
             })
             .collect()

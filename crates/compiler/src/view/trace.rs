@@ -61,7 +61,7 @@ pub(super) fn trace(rows: &[Row], machine: &Machine, drawn: &Drawing, placed: &D
 }
 
 /// First and last row of each pen down.
-fn pen_downs(rows: &[Row]) -> Vec<(usize, usize)> {
+pub(super) fn pen_downs(rows: &[Row]) -> Vec<(usize, usize)> {
     let mut runs = Vec::new();
     let mut start = None;
     for (index, row) in rows.iter().enumerate() {

@@ -188,5 +188,6 @@ fn scene(arguments: &Emulate, machine: Option<&LoadedMachine>, ink: &backends::I
         colors,
         travel: Vec::new(),
         start: None,
+        overlay: picture::Overlay::default(),
     }
 }

@@ -93,10 +93,14 @@ fn findings() -> Vec<Finding> {
     found
 }
 
-/// The page of drawings on a machine.
-pub(super) fn of_drawing(inputs: &Inputs, arguments: &Preview) -> Result<String, Failure> {
+/// Makes something of the view of drawings on a machine.
+pub(super) fn of_drawing<T>(
+    inputs: &Inputs,
+    arguments: &Preview,
+    make: impl FnOnce(&View<'_>) -> Result<T, Failure>,
+) -> Result<T, Failure> {
     let Some(name) = &arguments.machine else {
-        let what = "a page shows motion: which machine draws it? Give --machine NAME or --machine FILE.toml";
+        let what = "this shows a plan: which machine draws it? Give --machine NAME or --machine FILE.toml";
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     };
     let machine = machines::machine_with_paper(name, &arguments.reading)?.machine;
@@ -105,11 +109,15 @@ pub(super) fn of_drawing(inputs: &Inputs, arguments: &Preview) -> Result<String,
     let crop = arguments.reading.layout.crop;
     let request = super::request(&arguments.planning, crop, drawn.page(), &machine);
     let planned = planned(inputs, drawn.page(), &machine, request)?;
-    Ok(planned.view(inputs, &machine, &planned.rows, &planned.drawn).html())
+    make(&planned.view(inputs, &machine, &planned.rows, &planned.drawn))
 }
 
-/// The page of a plan file, whose rows hold whole ticks.
-pub(super) fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Failure> {
+/// Makes something of the view of a plan file, whose rows hold whole ticks.
+pub(super) fn of_plan<T>(
+    input: &Input,
+    machine: Option<&str>,
+    make: impl FnOnce(&View<'_>) -> Result<T, Failure>,
+) -> Result<T, Failure> {
     options::refuse_on_plan()?;
     let (plan, machine) = super::verify::plan(input, machine)?;
     let stated = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
@@ -120,7 +128,7 @@ pub(super) fn of_plan(input: &Input, machine: Option<&str>) -> Result<String, Fa
         certificate: Some(CertificateReport::of_motion(&certificate)),
         ..of_rows(&input.name, &machine.machine, &plan.table.header, &plan.table.rows)
     };
-    Ok(view.html())
+    make(&view)
 }
 
 /// The view of rows without a drawing.

@@ -1,8 +1,10 @@
 //! `plotplan preview`: a picture of a drawing or a plan on its machine.
 
+use std::io::IsTerminal as _;
 use std::path::Path;
 
 use compiler::pipeline::{self, Order};
+use compiler::view::{ColorBy, View};
 use compiler::{layout, scene};
 use picture::Scene;
 
@@ -12,7 +14,7 @@ use crate::cli::{PictureFormat, Preview};
 use crate::failure::Failure;
 use crate::input::{self, Input, Inputs};
 use crate::machines;
-use crate::{options, output, session};
+use crate::{options, output, session, terminal};
 
 /// A picture's longer side, pixels.
 const PIXELS: u32 = 1600;
@@ -22,18 +24,40 @@ pub(crate) fn run(arguments: &Preview) -> Result<(), Failure> {
     let inputs = Inputs::read(&arguments.files)?;
     let plan = inputs.single().filter(|input| plan::file::is_plan(&input.bytes));
     let machine = arguments.machine.as_deref();
-    if format == PictureFormat::Html {
-        let html = match plan {
-            Some(input) => page::of_plan(input, machine)?,
-            None => page::of_drawing(&inputs, arguments)?,
+    let moves = arguments.color_by.is_some() || arguments.at.is_some() || arguments.animate.is_some();
+    if format == PictureFormat::Html || moves {
+        let make = |view: &View<'_>| of_view(view, arguments, format);
+        return match plan {
+            Some(input) => page::of_plan(input, machine, make),
+            None => page::of_drawing(&inputs, arguments, make),
         };
-        return page::write(&arguments.output, &html);
     }
     let scene = match plan {
         Some(input) => of_plan(input, machine)?,
         None => of_drawing(&inputs, arguments)?,
     };
     write(&scene, &arguments.output, format)
+}
+
+/// Writes what needs a plan: a page, an animation, ink by a quantity, the machine in a pose.
+fn of_view(view: &View<'_>, arguments: &Preview, format: PictureFormat) -> Result<(), Failure> {
+    let to = &arguments.output;
+    let usage = |what: &'static str| Failure::Usage(anyhow::anyhow!(what));
+    if format == PictureFormat::Html {
+        return page::write(to, &view.html());
+    }
+    if let Some(turn_s) = arguments.animate {
+        if format != PictureFormat::Svg {
+            return Err(usage("--animate makes NAME.svg"));
+        }
+        if !(1.0..=600.0).contains(&turn_s) {
+            return Err(usage("--animate takes from 1s to 600s"));
+        }
+        let (scene, animation) = view.animation(turn_s);
+        return output::write(to, |out| picture::animation::svg(&scene, &animation, out));
+    }
+    let color = arguments.color_by.map_or(ColorBy::Pen, ColorBy::from);
+    write(&view.scene(color, arguments.at).map_err(usage)?, to, format)
 }
 
 /// A picture of a machine without a drawing.
@@ -62,6 +86,7 @@ fn format(output: &str, asked: Option<PictureFormat>) -> Result<PictureFormat, F
             wrong(format!("--format contradicts the extension of {output}"))
         }
         (Some(format), _) | (None, Some(format)) => Ok(format),
+        (None, None) if output == "-" && std::io::stdout().is_terminal() => Ok(PictureFormat::Text),
         (None, None) if output == "-" => Ok(PictureFormat::Svg),
         (None, None) => {
             wrong(format!("{output}: a picture is NAME.svg, NAME.png or NAME.html; or give --format"))
@@ -78,6 +103,12 @@ fn write(scene: &Scene, output: &str, format: PictureFormat) -> Result<(), Failu
             let bytes =
                 picture::png::encode(scene, PIXELS).map_err(|error| Failure::Drawing(error.into()))?;
             output::write(output, |out| out.write_all(&bytes))
+        }
+        PictureFormat::Text => {
+            let (columns, lines) = terminal::size();
+            let text = picture::braille::encode(scene, columns, lines.saturating_sub(2));
+            let text = text.map_err(|error| Failure::Drawing(error.into()))?;
+            output::write(output, |out| out.write_all(text.as_bytes()))
         }
     }
 }
