@@ -56,6 +56,7 @@ pub fn scene(diff: &Diff) -> Scene {
         colors,
         travel: Vec::new(),
         start: None,
+        overlay: picture::Overlay::default(),
     }
 }
 
