@@ -43,7 +43,9 @@ fn page_of_a_drawing_holds_rows_source_and_certificate() {
         assert_eq!(meta["certificate"]["holds"], true);
         assert_eq!(meta["exact"], true);
         let all = ["t", "pen", "a", "b", "deviation", "piece_row", "piece_start", "piece_length", "source"];
-        assert_eq!(columns(&meta), all);
+        // Where ticks are taken along the path, two more columns have their distance from the nearest.
+        let names: Vec<String> = columns(&meta).into_iter().filter(|name| !name.starts_with("off_")).collect();
+        assert_eq!(names, all);
         assert!(html.len() < 250_000, "{} bytes", html.len());
         assert!(
             !html.contains("http://")
