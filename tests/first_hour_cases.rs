@@ -441,3 +441,38 @@ fn resuming_beyond_the_end_is_refused_before_the_port_is_opened() {
     let rows = PROGRAM.refuse(&dir, "send plan.ticks --protocol ticks --port no-port --from 99999", 2);
     assert!(rows.contains("the plan has rows 0 to"), "{rows}");
 }
+
+#[test]
+fn plan_of_an_unknown_machine_asks_for_its_file() {
+    let dir = TestDir::new();
+    dir.write("a.hpgl", "IN;SP1;PU400,400;PD800,800;PU;");
+    let preset = compiler::machine_file::PRESETS.iter().find(|preset| preset.name == "corexy");
+    dir.write("mine.toml", preset.expect("a preset").toml.replace("name = \"corexy\"", "name = \"mine\""));
+    PROGRAM.succeed(&dir, "convert a.hpgl -m mine.toml -o plan.ticks");
+    for command in ["info plan.ticks", "preview plan.ticks -o x.svg", "verify plan.ticks"] {
+        let message = PROGRAM.refuse(&dir, command, 2);
+        assert!(message.contains("plan.ticks was made for the machine mine"), "{message}");
+        assert!(message.contains("--machine FILE.toml") && !message.contains("did you mean"), "{message}");
+    }
+}
+
+#[test]
+fn axidraw_is_fast_enough_for_its_own_format_only() {
+    let dir = TestDir::new();
+    // Long travel along the directions in which one motor does all the work.
+    dir.write("a.hpgl", "IN;SP1;PU0,0;PD400,400;PU8000,8000;PD8400,8400;PU0,8000;PD400,7600;PU;");
+    PROGRAM.succeed(&dir, "convert a.hpgl -m axidraw --format ebb -o a.ebb");
+}
+
+#[test]
+fn text_outside_of_layers_does_not_take_the_name_of_one() {
+    let dir = TestDir::new();
+    dir.write(
+        "a.svg",
+        "<svg xmlns='http://www.w3.org/2000/svg' xmlns:inkscape='http://www.inkscape.org/namespaces/inkscape' width='90mm' height='90mm'>\
+         <g inkscape:groupmode='layer' inkscape:label='1 black'><path d='M9 9h90' stroke='black'/></g>\
+         <path d='M9 99h90' stroke='black'/></svg>",
+    );
+    let text = PROGRAM.stdout_of(&dir, "info a.svg");
+    assert_eq!(text.matches("\"1 black\"").count(), 1, "{text}");
+}

@@ -84,7 +84,7 @@ fn verify_needs_file_of_custom_machine() {
             assert_eq!(alone.code, 0, "a plan document has its machine in it\n{}", alone.err);
         } else {
             assert_eq!(alone.code, 2, "{}", alone.err);
-            assert!(alone.err.contains("there is no machine called mine"), "{}", alone.err);
+            assert!(alone.err.contains("was made for the machine mine"), "{}", alone.err);
         }
         dir.succeed("verify plan --drawing tiny.hpgl --machine mine.toml");
         // The same ticks draw something else on another arm.

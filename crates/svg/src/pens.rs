@@ -123,7 +123,10 @@ impl Keys {
             };
             pen_of.insert(key, pen);
             settings.entry(pen).or_insert_with(|| PenSettings {
-                name: own.or_else(|| only.copied()).map(|layer| self.layers[layer].name.clone()),
+                // Strokes outside of all layers have no name, though they may be the only others.
+                name: own
+                    .or_else(|| layer.filter(|layer| only == Some(layer)))
+                    .map(|layer| self.layers[layer].name.clone()),
                 color: Some(color),
             });
         }

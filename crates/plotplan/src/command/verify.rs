@@ -138,7 +138,16 @@ pub(super) fn plan(input: &Input, machine: Option<&str>) -> Result<(PlanFile, Lo
             let machine = file.machine().with_context(what).map_err(Failure::Drawing)?;
             LoadedMachine { file, machine }
         }
-        (None, None) => machines::machine(&plan.table.header.machine)?,
+        (None, None) => {
+            let name = &plan.table.header.machine;
+            machines::machine(name).map_err(|failure| match failure {
+                Failure::Usage(error) if !error.is::<machines::Unusable>() => Failure::Usage(anyhow::anyhow!(
+                    "{} was made for the machine {name}, which is no preset and no machine of your own: give its file with --machine FILE.toml",
+                    input.path
+                )),
+                other => other,
+            })?
+        }
     };
     Ok((plan, machine))
 }
