@@ -320,7 +320,37 @@ pub fn compile<'a>(
     };
     let strokes = ordered.strokes.len();
 
-    progress(Step::Planning(0, strokes));
+    let Planned { mut trajectory, mut header, mut certificate } =
+        planned(&placed, ordered, placement, machine, request, progress)?;
+    if request.rounding == Rounding::Path && !certificate.holds {
+        // Along the path the rows are proved, the motion between them is measured. Where the ticks are
+        // nearly as coarse as the drawing it may cut a corner; with the nearest ticks it does not.
+        let nearest = Request { rounding: Rounding::Nearest, ..request.clone() };
+        let other = planned(&placed, trajectory.drawing().clone(), placement, machine, &nearest, progress)?;
+        if other.certificate.holds {
+            Planned { trajectory, header, certificate } = other;
+        }
+    }
+    Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
+}
+
+/// A plan and its certificate.
+struct Planned<'a> {
+    trajectory: Trajectory<'a>,
+    header: Header,
+    certificate: Certificate,
+}
+
+/// Plans an ordered drawing, and certifies the plan against the placed one.
+fn planned<'a>(
+    placed: &Drawing,
+    ordered: Drawing,
+    placement: Affine,
+    machine: &'a Machine,
+    request: &Request,
+    progress: &dyn Fn(Step),
+) -> Result<Planned<'a>, PlanError> {
+    progress(Step::Planning(0, ordered.strokes.len()));
     let settings = Settings {
         pen_speeds_mm_s: request.pen_speeds.clone(),
         timing_law: request.timing_law,
@@ -353,7 +383,7 @@ pub fn compile<'a>(
     // Against the drawing in the file's order, so that anything ordering lost or changed shows. Where
     // ordering provably changed only order and direction, against its result: where strokes crowd,
     // ink that follows them from end to end is measured much faster.
-    let drawn = if same_ink(&placed, ordered) { ordered } else { &placed };
+    let drawn = if same_ink(placed, ordered) { ordered } else { placed };
     let certificate = verify::certify(machine, drawn, &header, request.tolerance_mm, || {
         trajectory.rows().enumerate().map(|(done, row)| {
             if (done as u64).is_multiple_of(PROGRESS_ROWS) {
@@ -362,5 +392,5 @@ pub fn compile<'a>(
             (row.row, Some(row.exact))
         })
     });
-    Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
+    Ok(Planned { trajectory, header, certificate })
 }
