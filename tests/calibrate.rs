@@ -1,6 +1,7 @@
 //! `plotplan calibrate` on an arm that is not as its file says. The touches come from the equations of the
 //! arm, written out here.
 
+use std::fmt::Write as _;
 use std::fs;
 
 use compiler::machine_file::{MachineFile, PRESETS};
@@ -24,7 +25,11 @@ fn ticks((x, y): (f64, f64), left: bool) -> [f64; 2] {
 }
 
 fn rows(places: impl IntoIterator<Item = (f64, f64)>, left: bool) -> String {
-    places.into_iter().map(|place| ticks(place, left)).map(|[a, b]| format!("{a},{b}\n")).collect()
+    let row = |place| {
+        let [a, b] = ticks(place, left);
+        format!("{a},{b}\n")
+    };
+    places.into_iter().map(row).collect::<Vec<_>>().concat()
 }
 
 fn write(dir: &TestDir, name: &str, text: &str) {
@@ -105,7 +110,7 @@ fn pattern_measured_with_a_ruler() {
             preset.pose_near((x + sheet.x0, y + sheet.y0).into(), &preset.start()).expect("within reach");
         let ticks = MotorPos(preset.motor_positions(&pose).0.map(f64::round));
         let pen = preset.forward_from_motors(&(ticks - MotorPos::new(7.0, -7.0)));
-        drawn += &format!("{},{:.1},{:.1}\n", index + 1, pen.x - sheet.x0, pen.y - sheet.y0);
+        writeln!(drawn, "{},{:.1},{:.1}", index + 1, pen.x - sheet.x0, pen.y - sheet.y0).expect("a string");
         marks.push(pen);
     }
     assert!(marks.len() >= 20, "{}", marks.len());

@@ -44,7 +44,8 @@ fn page_of_a_drawing_holds_rows_source_and_certificate() {
         assert_eq!(meta["exact"], true);
         let all = ["t", "pen", "a", "b", "deviation", "piece_row", "piece_start", "piece_length", "source"];
         // Where ticks are taken along the path, two more columns have their distance from the nearest.
-        let names: Vec<String> = columns(&meta).into_iter().filter(|name| !name.starts_with("off_")).collect();
+        let names: Vec<String> =
+            columns(&meta).into_iter().filter(|name| !name.starts_with("off_")).collect();
         assert_eq!(names, all);
         assert!(html.len() < 250_000, "{} bytes", html.len());
         assert!(
@@ -120,7 +121,7 @@ fn pictures_color_ink_by_a_quantity_and_show_the_machine() {
         fs::read_to_string(dir.path().join("x.svg")).unwrap()
     };
     for (words, texts) in [
-        ("--color speed", [">pen speed<", ">0.0 mm/s<", ">60.0 mm/s<"]),
+        ("--color speed", [">pen speed<", ">0.0 mm/s<", " mm/s<"]),
         ("--color-by=limit", [">what limits the pen<", ">the pen's speed<", ">acceleration of arm1<"]),
         ("--color deviation", [">distance from the drawing<", ">0.000 mm<", " mm<"]),
         ("--color order", [">order<", ">0.0 s<", " s<"]),

@@ -30,8 +30,9 @@ impl Project {
 
     fn files(&self, folder: &str) -> Vec<String> {
         let entries = std::fs::read_dir(self.0.path().join(folder)).expect("a folder");
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.expect("an entry").file_name().into_string().expect("a name"))
+            .collect();
         names.sort();
         names
     }
@@ -60,7 +61,7 @@ fn build_makes_what_is_out_of_date_and_says_why() {
 
     project.0.write(
         "plotplan.toml",
-        &TWO.replacen("output", "tolerance = \"0.2mm\"\noutput", 1).replacen(", \"out/a.svg\"", "", 1),
+        TWO.replacen("output", "tolerance = \"0.2mm\"\noutput", 1).replacen(", \"out/a.svg\"", "", 1),
     );
     let (_, said) = project.exits(0, "build");
     assert!(said.contains("out/a.ticks") && said.contains("(with --tolerance=0.2mm)"), "{said}");
@@ -81,7 +82,7 @@ fn machine_file_of_a_project_is_an_input() {
     project.0.write("mine.toml", &machine);
     project.exits(0, "build");
     assert_eq!(project.exits(0, "build").1, "1 up to date\n");
-    project.0.write("mine.toml", &format!("{machine}\n# changed\n"));
+    project.0.write("mine.toml", format!("{machine}\n# changed\n"));
     assert!(project.exits(0, "build").1.contains("(the machine changed)"));
 }
 
@@ -193,6 +194,7 @@ fn init_writes_a_project_that_builds() {
 
 #[cfg(unix)]
 #[test]
+#[expect(clippy::disallowed_methods, reason = "the limits of this test are times")]
 fn watch_builds_again_and_ends_within_half_a_second_of_a_signal() {
     let project = Project::new(TWO);
     let mut child = Command::new(PATH)
@@ -248,7 +250,7 @@ fn diff_names_strokes_quantities_and_causes() {
     }
 
     let (machine, _) = project.exits(0, "machine show coaxial");
-    project.0.write("fast.toml", &machine.replace("60deg/s", "90deg/s"));
+    project.0.write("fast.toml", machine.replace("60deg/s", "90deg/s"));
     project.0.write("same.toml", &machine);
     let (said, _) = project.exits(1, "diff same.toml fast.toml --exit-code");
     assert_eq!(

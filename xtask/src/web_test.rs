@@ -26,12 +26,11 @@ pub(crate) fn run(program: Option<&str>, write: bool) -> Result<bool> {
     let (tests, pages) = (top.join("viewer/test"), top.join("target/web-test"));
     install(&tests)?;
     execute(Command::new(tests.join("node_modules/.bin/tsc")).args(["-p", "viewer"]))?;
-    let program = match program {
-        Some(program) => PathBuf::from(program),
-        None => {
-            execute(Command::new("cargo").args(["build", "--release", "--locked", "-p", "plotplan"]))?;
-            top.join("target/release/plotplan")
-        }
+    let program = if let Some(program) = program {
+        PathBuf::from(program)
+    } else {
+        execute(Command::new("cargo").args(["build", "--release", "--locked", "-p", "plotplan"]))?;
+        top.join("target/release/plotplan")
     };
     std::fs::create_dir_all(&pages).with_context(|| format!("{}", pages.display()))?;
     write_pages(&program, &pages)?;

@@ -20,7 +20,7 @@ fn corners([width, height]: [f64; 2]) -> [Point; 4] {
 /// The coaxial arm of report 1, by its machine file.
 fn arm() -> Setup {
     Setup {
-        kind: Setup::kind_of("two-link").unwrap(),
+        kind: Setup::kind_of("two-link").expect("a kind of machine"),
         geometry: BTreeMap::from([
             ("l1".into(), Parameter::Length(206.0)),
             ("l2".into(), Parameter::Length(256.0)),
@@ -38,7 +38,7 @@ fn five_bar() -> Setup {
     let length = |key: &str, mm| (key.to_owned(), Parameter::Length(mm));
     let choice = |key: &str, side: &str| (key.to_owned(), Parameter::Choice(side.into()));
     Setup {
-        kind: Setup::kind_of("five-bar").unwrap(),
+        kind: Setup::kind_of("five-bar").expect("a kind of machine"),
         geometry: BTreeMap::from([
             ("base1".into(), Parameter::Point(Point::new(-40.0, 0.0))),
             ("base2".into(), Parameter::Point(Point::new(40.0, 0.0))),
@@ -60,7 +60,7 @@ fn five_bar() -> Setup {
 
 fn polargraph() -> Setup {
     Setup {
-        kind: Setup::kind_of("polargraph").unwrap(),
+        kind: Setup::kind_of("polargraph").expect("a kind of machine"),
         geometry: BTreeMap::from([
             ("left".into(), Parameter::Point(Point::ZERO)),
             ("right".into(), Parameter::Point(Point::new(650.0, 0.0))),
@@ -75,7 +75,7 @@ fn polargraph() -> Setup {
 
 fn corexy() -> Setup {
     Setup {
-        kind: Setup::kind_of("cartesian").unwrap(),
+        kind: Setup::kind_of("cartesian").expect("a kind of machine"),
         geometry: BTreeMap::new(),
         coupling: [[1.0, 1.0], [1.0, -1.0]],
         ticks_per_unit: [92.03; 2],
@@ -87,7 +87,7 @@ fn corexy() -> Setup {
 
 fn polar() -> Setup {
     Setup {
-        kind: Setup::kind_of("polar").unwrap(),
+        kind: Setup::kind_of("polar").expect("a kind of machine"),
         geometry: BTreeMap::new(),
         coupling: [[-1.0, 0.0], [0.0, 1.0]],
         ticks_per_unit: [1856.0 / TAU * 2.0, 360.0 / 44.0],
@@ -129,7 +129,7 @@ fn hidden(random: &mut Random) -> Setup {
 
 /// Touches of places, with 0.25 mm of pointing error along x and y, and whole ticks.
 fn touches(hidden: &Setup, places: &[Point], random: &mut Random) -> Vec<Touch> {
-    let near = hidden.ticks(Point::new(100.0, 100.0), hidden.offset_ticks).unwrap();
+    let near = hidden.ticks(Point::new(100.0, 100.0), hidden.offset_ticks).expect("a place within reach");
     let touch = |place: &Point| {
         let pointed = *place + 0.25 * Vec2::new(normal(random), normal(random));
         let ticks = hidden.ticks(pointed, near)?.map(f64::round);
@@ -146,14 +146,14 @@ fn with_elbow(setup: &Setup, side: &str) -> Setup {
 
 /// Where the hidden machine draws what the calibrated one plans, against where it should: mean square, mm².
 fn page_error(calibrated: &Setup, hidden: &Setup) -> f64 {
-    let near = hidden.ticks(Point::new(100.0, 60.0), hidden.offset_ticks).unwrap();
+    let near = hidden.ticks(Point::new(100.0, 60.0), hidden.offset_ticks).expect("a place within reach");
     let mut squares = Vec::new();
     for k in 0..81 {
         let share = |k: i32| f64::from(k) / 8.0;
         let [width, height] = hidden.sheet_mm;
         let place = Point::new(share(k % 9) * width, share(k / 9) * height);
         let Some(ticks) = calibrated.ticks(place, near) else { continue };
-        squares.push((hidden.pen(ticks).unwrap() - place).hypot2());
+        squares.push((hidden.pen(ticks).expect("a pose") - place).hypot2());
     }
     assert!(squares.len() > 60, "most of the page is within reach");
     squares.iter().sum::<f64>() / squares.len() as f64

@@ -44,7 +44,6 @@ fn hold(build_up_ms: u32, [median, worst]: [f64; 2]) {
         for (stroke, points) in strokes() {
             let Some(optimum) = optimum(name, stroke, build_up_ms) else { continue };
             let ratio = drawing_time(&machine, origin, &points) / optimum;
-            println!("{name:<8} {stroke:<24} {build_up_ms:>4} ms {optimum:.4} s {ratio:.4}");
             if !(0.99..worst).contains(&ratio) {
                 wrong.push(format!("{name}, {stroke}: {ratio:.4} of {optimum} s"));
             }
@@ -52,7 +51,6 @@ fn hold(build_up_ms: u32, [median, worst]: [f64; 2]) {
         }
         assert!(ratios.len() >= LEAST_STROKES, "the table has {} strokes of {name}", ratios.len());
         ratios.sort_by(f64::total_cmp);
-        println!("{name:<8} median {:.4}, worst {:.4}", ratios[ratios.len() / 2], ratios[ratios.len() - 1]);
         if ratios[ratios.len() / 2] > median {
             wrong.push(format!("{name}: median {:.4}", ratios[ratios.len() / 2]));
         }

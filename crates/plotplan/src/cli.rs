@@ -438,7 +438,7 @@ pub(crate) struct Calibrate {
     /// Machine: a preset's name or a machine file
     #[arg(value_name = "MACHINE")]
     pub(crate) machine: String,
-    /// Touches: rows of x_mm,y_mm,MOTOR1,MOTOR2[,elbow], where x and y are mm from the sheet's lower-left corner, and the
+    /// Touches: rows of `x_mm,y_mm,MOTOR1,MOTOR2[,elbow]`, where x and y are mm from the sheet's lower-left corner, and the
     /// motors' columns are ticks while the pen is there
     #[arg(value_name = "TOUCHES.csv", required_unless_present_any = ["drawn", "distances", "pattern"])]
     pub(crate) touches: Option<String>,
@@ -446,10 +446,10 @@ pub(crate) struct Calibrate {
     /// and again from the first for a second round
     #[arg(long, value_name = "NAME|WxH", value_parser = compiler::paper::size_mm, requires = "touches")]
     pub(crate) corners: Option<[f64; 2]>,
-    /// Marks of the pattern, measured with a ruler: rows of mark,x_mm,y_mm
+    /// Marks of the pattern, measured with a ruler: rows of `mark,x_mm,y_mm`
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) drawn: Option<String>,
-    /// Distances between marks of the pattern: rows of mark,mark,distance_mm
+    /// Distances between marks of the pattern: rows of `mark,mark,distance_mm`
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) distances: Option<String>,
     /// Write the pattern of numbered crosses for this machine, as HP-GL, instead

@@ -128,7 +128,7 @@ fn by_positioning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> Option<i16>
     }
     let mut sum = 0;
     for lookup in lookups.into_iter().filter_map(|index| table.lookups.get(index)) {
-        let pairs =
+        let mut pairs =
             lookup.subtables.into_iter::<PositioningSubtable<'_>>().filter_map(|subtable| match subtable {
                 PositioningSubtable::Pair(pairs) => Some(pairs),
                 _ => None,
@@ -143,7 +143,7 @@ fn by_positioning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> Option<i16>
             };
             Some(first.x_advance)
         };
-        sum += pairs.filter_map(of_pair).next().unwrap_or(0);
+        sum += pairs.find_map(of_pair).unwrap_or(0);
     }
     Some(sum)
 }

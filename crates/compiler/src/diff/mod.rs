@@ -241,10 +241,11 @@ impl Diff {
     /// the same within `within_mm`, or if that is not given, within the sum of what both sides may
     /// deviate from their drawing: 0.01 mm for a drawing; tolerance and whole ticks for a plan.
     pub fn of(mut old: Side, mut new: Side, within_mm: Option<f64>) -> Self {
-        let within_mm = within_mm.unwrap_or_else(|| match (old.kind, new.kind) {
+        let usual_mm = match (old.kind, new.kind) {
             (Kind::Drawing, Kind::Drawing) => DRAWING_MM,
             _ => old.within_mm + new.within_mm,
-        });
+        };
+        let within_mm = within_mm.unwrap_or(usual_mm);
         match (old.kind, new.kind) {
             (Kind::Drawing, Kind::Plan) => place(&mut old, new.placement),
             (Kind::Plan, Kind::Drawing) => place(&mut new, old.placement),

@@ -165,6 +165,7 @@ mod tests {
     const WITHOUT_UNIT: &[&str] = &[
         // Coefficients of a map and of the coupling.
         "placement",
+        "start_manipulability",
         "row",
         "ticks_per_unit",
         // Ticks/s, ticks/s², ticks/s³, named before units were suffixes.

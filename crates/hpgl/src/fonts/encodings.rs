@@ -181,9 +181,11 @@ const SPANISH: &[(u8, char)] = &[
     (b'~', TILDE),
 ];
 
-/// The marks that the font can draw, the sign that each is drawn as, and letters with their form
-/// under it.
-const MARKS: &[(char, char, &[(char, char)])] = &[
+/// A mark, the sign that it is drawn as, and letters with their form under it.
+type MarkRow = (char, char, &'static [(char, char)]);
+
+/// The marks that the font can draw.
+const MARKS: &[MarkRow] = &[
     (
         GRAVE,
         '`',

@@ -336,6 +336,6 @@ fn compare(task: &Task<'_>, made: Result<Output, Failure>) -> Result<BuiltOutput
 /// Where two files begin to differ.
 fn first_difference(old: &[u8], new: &[u8]) -> String {
     let same = old.iter().zip(new).take_while(|(a, b)| a == b).count();
-    let line = 1 + old[..same].iter().filter(|byte| **byte == b'\n').count();
+    let line = old[..same].split(|byte| *byte == b'\n').count();
     format!("differs from line {line}, byte {same}, on")
 }

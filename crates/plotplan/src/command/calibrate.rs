@@ -85,10 +85,10 @@ fn write(
         .map_err(|what| Failure::Drawing(anyhow!("the machine file: {what}")))?;
     let parsed = compiler::machine_file::MachineFile::parse(&text).and_then(|file| file.machine());
     parsed.context("the calibrated machine").map_err(Failure::Drawing)?;
-    match arguments.report_only() {
-        true => Ok(()),
-        false => output::write(&arguments.output, |out| out.write_all(text.as_bytes())),
+    if arguments.report_only() {
+        return Ok(());
     }
+    output::write(&arguments.output, |out| out.write_all(text.as_bytes()))
 }
 
 fn measurements(arguments: &Calibrate, motors: [&str; 2], marks: &Marks) -> Result<Measurements, Failure> {

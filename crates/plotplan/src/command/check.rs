@@ -52,13 +52,11 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
             None => text.push_str("no ink\n"),
         }
     }
-    let verdict = match &machine {
-        Some(machine) => placed(arguments, &inputs, &drawn, &machine.machine, &mut text),
-        None => {
-            let planning = &arguments.planning;
-            clean::on_sheet(&inputs, &drawn, planning, &arguments.reading, target)
-                .map(|on| text.push_str(&on))
-        }
+    let verdict = if let Some(machine) = &machine {
+        placed(arguments, &inputs, &drawn, &machine.machine, &mut text)
+    } else {
+        let planning = &arguments.planning;
+        clean::on_sheet(&inputs, &drawn, planning, &arguments.reading, target).map(|on| text.push_str(&on))
     };
     output::report(&text)?;
     verdict

@@ -112,13 +112,12 @@ pub(super) struct Workspace {
 
 impl Problem<'_> {
     fn span(&self, spline: &Spline, j: usize) -> Option<Span> {
-        let forms = match self.limits.everywhere() {
-            Some(forms) => [forms; 3],
-            None => {
-                let curve = drawing::Segment::Cubic(spline.bezier(j));
-                let at = |share: f64| self.limits.near(curve.eval(share));
-                [at(PLACES[0])?, at(PLACES[1])?, at(PLACES[2])?]
-            }
+        let forms = if let Some(forms) = self.limits.everywhere() {
+            [forms; 3]
+        } else {
+            let curve = drawing::Segment::Cubic(spline.bezier(j));
+            let at = |share: f64| self.limits.near(curve.eval(share));
+            [at(PLACES[0])?, at(PLACES[1])?, at(PLACES[2])?]
         };
         let may_limit_speed = [0, 1].map(|k| {
             let fastest = self.limits.square_pen_speed * self.limits.square_ratios[k];
@@ -459,7 +458,6 @@ impl Local {
     }
 
     /// Adds it to the system, where the span's first control point has the unknowns from `base` on.
-    #[expect(clippy::needless_range_loop, reason = "rows and columns of several matrices")]
     fn scatter(&self, rows: &[[f64; 4]; 3], system: &mut Banded<12>, base: isize) {
         let h = &self.hessian;
         let block = |at: usize, to: usize| {

@@ -298,13 +298,13 @@ impl Oriented {
 
     /// Places, as shares of the length and without the ends, where m' of motor k changes its sign.
     fn roots(&self, k: usize, mut found: impl FnMut(f64)) {
+        const PARTS: u32 = 8;
         let c = &self.first[k];
         // Bernstein coefficients: the polynomial lies between the least and the largest.
         let hull = bernstein(c);
         if hull.iter().all(|x| *x >= 0.0) || hull.iter().all(|x| *x <= 0.0) {
             return;
         }
-        const PARTS: u32 = 8;
         let at = |part: u32| f64::from(part) / f64::from(PARTS);
         for part in 0..PARTS {
             let (mut low, mut high) = (at(part), at(part + 1));
@@ -356,15 +356,15 @@ fn bernstein(c: &[f64; 6]) -> [f64; 6] {
 /// The polynomial of degree 5 on [0, 1] with these values at 0, 1/2 and 1, and these derivatives by
 /// `s = t length`. Higher terms that are rounding error are 0.
 pub(crate) fn hermite(length: f64, x: [f64; 3], y: [f64; 3]) -> [f64; 6] {
-    let (c0, c1) = (x[0], length * y[0]);
-    // What the first two terms leave: p(1/2), p'(1/2), p(1), p'(1).
-    let rest = [x[1] - c0 - 0.5 * c1, length * y[1] - c1, x[2] - c0 - c1, length * y[2] - c1];
     const INVERSE: [[f64; 4]; 4] = [
         [16.0, -8.0, 7.0, -1.0],
         [-32.0, 32.0, -34.0, 5.0],
         [16.0, -40.0, 52.0, -8.0],
         [0.0, 16.0, -24.0, 4.0],
     ];
+    let (c0, c1) = (x[0], length * y[0]);
+    // What the first two terms leave: p(1/2), p'(1/2), p(1), p'(1).
+    let rest = [x[1] - c0 - 0.5 * c1, length * y[1] - c1, x[2] - c0 - c1, length * y[2] - c1];
     let mut c = [c0, c1, 0.0, 0.0, 0.0, 0.0];
     for (c, row) in c[2..].iter_mut().zip(INVERSE) {
         *c = row.iter().zip(rest).map(|(a, b)| a * b).sum();

@@ -2,7 +2,7 @@
 //!
 //! With `b = (ds/dt)²` and `u = d²s/dt²` the fastest motion has one bound at its limit at every
 //! place: a motor's acceleration, a speed limit, or the limit near corners (Bobrow et al. 1985, Shin
-//! & McKay 1985). While that is a motor's acceleration b is known in closed form for any geometry
+//! and `McKay` 1985). While that is a motor's acceleration b is known in closed form for any geometry
 //! (`flow`), so an arc lasts until another bound takes over and nothing is refined.
 //!
 //! The path is divided into cells on which the motors' derivatives are polynomials of degree 5,

@@ -196,9 +196,8 @@ impl Job {
         };
         let program = std::env::current_exe().map_err(failed("cannot find the program itself"))?;
         let [mut out, mut messages] = [(); 2].map(|()| tempfile::tempfile());
-        let (out, messages) = match (&mut out, &mut messages) {
-            (Ok(out), Ok(messages)) => (out, messages),
-            _ => return Err(Failure::Io(anyhow::anyhow!("cannot make a temporary file"))),
+        let (Ok(out), Ok(messages)) = (&mut out, &mut messages) else {
+            return Err(Failure::Io(anyhow::anyhow!("cannot make a temporary file")));
         };
         let copy = |file: &std::fs::File| {
             file.try_clone().map(Stdio::from).map_err(failed("cannot make a temporary file"))
