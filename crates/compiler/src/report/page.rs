@@ -166,6 +166,15 @@ mod tests {
         // Coefficients of a map and of the coupling.
         "placement",
         "start_manipulability",
+        // Of the normal equations.
+        "condition",
+        // In the unit that another key of the object names.
+        "before",
+        "found",
+        "deviation",
+        "old",
+        "values",
+        "new",
         "row",
         "ticks_per_unit",
         // Ticks/s, ticks/s², ticks/s³, named before units were suffixes.
