@@ -174,6 +174,8 @@ mod tests {
         "deviation",
         "old",
         "values",
+        // A factor, and a shift in mm.
+        "moved_by",
         "new",
         "row",
         "ticks_per_unit",
