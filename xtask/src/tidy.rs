@@ -82,8 +82,9 @@ const RESERVED: &[(&str, &[&str])] = &[
     ("clap", &["plotplan"]),
     ("serialport", &["plotplan"]),
     ("indicatif", &["plotplan"]),
-    ("toml", &["backends", "compiler", "xtask"]),
-    ("toml_edit", &["compiler"]),
+    // In the binary for projects, whose keys are options of the command line.
+    ("toml", &["backends", "compiler", "plotplan", "xtask"]),
+    ("toml_edit", &["compiler", "plotplan"]),
     ("serde", &["backends", "compiler", "plan", "plotplan"]),
     ("serde_json", &["backends", "compiler", "plan", "plotplan", "xtask"]),
 ];
