@@ -43,7 +43,7 @@ impl Matching {
     /// Pairs the strokes of both sides, each at most once. Two strokes are the same if their bounding
     /// boxes agree within `within_mm` and each lies within `within_mm` of the other at the sampled
     /// points; where a closed line begins does not matter. A stroke is compared with at most
-    /// [`CANDIDATES`] others of its bounding box and as many of its size.
+    /// 64 others of its bounding box and as many of its size.
     pub fn of(old: &[Polyline], new: &[Polyline], within_mm: f64) -> Self {
         let [olds, news] = [old, new].map(|lines| lines.iter().map(Shape::of).collect::<Vec<_>>());
         let mut open = Open { olds: (0..old.len()).collect(), news: Grid::of(&news, within_mm) };

@@ -82,7 +82,7 @@ fn other_drawing(plan: &PlanFile, drawing: &Inputs) -> Option<String> {
     })
 }
 
-/// As [`plan`], for commands that show the plan on its machine. Stops if the machine's motors are not
+/// As [`plan()`], for commands that show the plan on its machine. Stops if the machine's motors are not
 /// those of the plan, and warns if it has another name.
 pub(super) fn plan_on_its_machine(
     input: &Input,
