@@ -216,7 +216,7 @@ fn resume_after_ctrl_c() {
                     let words: Vec<&str> = command.split(' ').skip(1).collect();
                     assert_eq!(words[words.len() - 2], "--from", "{what}: {said}");
                     desk.good(&words);
-                    assert_eq!(device.ink(), wanted(protocol, plan), "{what}");
+                    assert_eq!(device.ink(), wanted(protocol, plan), "{what}: {said}");
                 });
             }
         }
