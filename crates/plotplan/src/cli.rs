@@ -14,7 +14,9 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
-pub(crate) use device::{Emulate, Flow, PenLift, Send};
+#[cfg(unix)]
+pub(crate) use device::Emulate;
+pub(crate) use device::{Flow, PenLift, Send};
 pub(crate) use format::Format;
 pub(crate) use ink::{InkColor, with_ink_color};
 pub(crate) use project::{Build, Diff, Init};

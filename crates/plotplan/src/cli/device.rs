@@ -6,7 +6,9 @@ use backends::{Backend, EncodeOptions, PenActuator};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::values::{fault, name, positions, time};
+#[cfg(unix)]
+use super::values::fault;
+use super::values::{name, positions, time};
 
 /// How firmware formats move the pen.
 #[derive(Clone, Copy, Debug, Args)]
