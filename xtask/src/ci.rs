@@ -36,14 +36,14 @@ const STEPS: &[Step] = &[
     step("windows", "the program compiles for Windows", || check("x86_64-pc-windows-gnu", "plotplan")),
     step("macos", "the program compiles for macOS", || check("aarch64-apple-darwin", "plotplan")),
     step("package", "every crate can be packaged", || {
-        cargo("package --workspace --no-verify --locked --allow-dirty --quiet")
+        cargo("package --workspace --exclude xtask --no-verify --locked --allow-dirty --quiet")
     }),
     step("corpus", "every drawing of ../shared/corpus, where it exists", corpus),
     step("web-test", "animated previews in a browser; installs Node.js, npm packages and Chromium", web_test),
     step("fuzz", "one minute of fuzzing; installs nightly and cargo-fuzz if missing", fuzz),
     on_request("firmware", "the firmware on an emulated ATmega328P; installs Debian packages", firmware),
     on_request("verify-package", "every crate builds from its package", || {
-        cargo("package --workspace --locked --allow-dirty")
+        cargo("package --workspace --exclude xtask --locked --allow-dirty")
     }),
     on_request("typos", "spelling; needs typos-cli", || run("typos", "")),
     on_request("deny", "licences, bans and sources; needs cargo-deny", || {
