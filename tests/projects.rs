@@ -119,6 +119,10 @@ fn failed_output_names_its_drawing_and_the_others_are_made() {
         "{said}"
     );
     assert_eq!(project.files("out"), ["b.csv"]);
+    std::fs::remove_file(project.0.path().join("out/b.csv")).expect("it was written");
+    std::fs::remove_file(project.0.path().join("a.hpgl")).expect("it was written");
+    let (_, said) = project.exits(1, "build");
+    assert!(said.contains("cannot read a.hpgl") && said.contains("1 built, 2 failed"), "{said}");
     project.0.write("a.hpgl", "IN;SP1;PU0,0;PD400,0;PU;");
     assert!(project.exits(0, "build").1.ends_with("2 built, 1 up to date\n"));
 }
@@ -189,7 +193,8 @@ fn init_writes_a_project_that_builds() {
     std::fs::create_dir(&other).unwrap();
     project.exits(0, "init elsewhere");
     // There is no drawing yet.
-    project.exits(3, "build --project elsewhere");
+    let (_, said) = project.exits(1, "build --project elsewhere");
+    assert!(said.contains("cannot read drawing.hpgl"), "{said}");
 }
 
 #[cfg(unix)]

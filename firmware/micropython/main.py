@@ -2,10 +2,8 @@
 
 import os
 
-import machine as config
+import config
 import pyb
-
-# `machine` is also MicroPython's own module for hardware: machine.py on the board comes first.
 from plotplan.plotter import Plotter
 from plotplan.ports import Port
 

@@ -9,7 +9,7 @@ const DARK: u32 = 150;
 /// The bit of each dot of a character, by column and row (Unicode, block Braille Patterns).
 const BITS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
 
-/// Sheet, ink and lines of a scene in at most so many columns and lines of characters.
+/// Sheet, ink and lines of a scene in at most `columns` columns and `lines` lines of characters.
 ///
 /// # Errors
 /// Where there is no memory for the picture.

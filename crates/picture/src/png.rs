@@ -57,7 +57,7 @@ pub(crate) struct Canvas {
 }
 
 impl Canvas {
-    /// A white canvas for this part of the plane, mm, with so many pixels per mm.
+    /// A white canvas for this part of the plane, mm, with `scale` pixels per mm.
     pub(crate) fn new(bounds: Rect, scale: f64) -> Result<Self, PngError> {
         let pixels = |length: f64| (length * scale - 1e-9).ceil().clamp(1.0, f64::from(LARGEST_PX)) as u32;
         let pixmap = Pixmap::new(pixels(bounds.width()), pixels(bounds.height()));

@@ -214,7 +214,7 @@ pub(crate) fn colors_of(overlay: &Overlay) -> Vec<Colour> {
     colors
 }
 
-/// Lines of one colour as one path; nothing if there are none.
+/// Lines of one colour as one path. Writes no element for an empty list.
 fn write_lines<'a, W: Write + ?Sized>(
     text: &mut Text<'_, W>,
     class: &str,

@@ -548,7 +548,7 @@ pub(crate) enum FirmwareDrive {
     Dc,
     /// RC servos
     Servo,
-    /// DC motors with encoders, on a board with MicroPython: the module machine.py
+    /// DC motors with encoders, on a board with MicroPython: the module config.py
     Micropython,
 }
 

@@ -23,7 +23,7 @@ START_US = 200_000
 
 
 class Motion:
-    """What a plan's lines do to the machine. `encoders` measure, `config` is machine.py."""
+    """What a plan's lines do to the machine. `encoders` measure, `config` is config.py."""
 
     def __init__(self, config, encoders):
         self.name = config.NAME

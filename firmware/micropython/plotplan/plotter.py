@@ -18,7 +18,7 @@ GARBAGE_US = 100_000
 
 
 class Plotter:
-    """`config` is the module machine.py, as `plotplan machine show M --firmware-config micropython` writes it."""
+    """`config` is the module config.py, as `plotplan machine show M --firmware-config micropython` writes it."""
 
     def __init__(self, config):
         self.period_us = config.PERIOD_US

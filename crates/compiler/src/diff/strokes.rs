@@ -237,25 +237,14 @@ impl Open {
         map: Affine,
         may: impl Fn(usize, usize) -> bool,
     ) -> Vec<Pair> {
-        let within_mm = self.news.within_mm;
-        let mut pairs = Vec::new();
-        let mut left = Vec::new();
-        for old in std::mem::take(&mut self.olds) {
+        self.pair_up(news, |free, old| {
             let shape = &olds[old];
-            let candidates = self.news.near(news, map.transform_rect_bbox(shape.bounds));
-            let pair = candidates.filter(|new| may(old, *new)).take(CANDIDATES).find_map(|new| {
-                let is_reversed = compare(shape, &news[new], map, within_mm)?;
+            let candidates = free.near(news, map.transform_rect_bbox(shape.bounds));
+            candidates.filter(|new| may(old, *new)).take(CANDIDATES).find_map(|new| {
+                let is_reversed = compare(shape, &news[new], map, free.within_mm)?;
                 Some(Pair { old, new, is_reversed })
-            });
-            if let Some(pair) = pair {
-                self.news.remove(news, pair.new);
-                pairs.push(pair);
-            } else {
-                left.push(old);
-            }
-        }
-        self.olds = left;
-        pairs
+            })
+        })
     }
 
     /// Pairs strokes of the same shape anywhere; first at the last displacement that was found.
@@ -270,8 +259,7 @@ impl Open {
         let mut by_width = self.news.free();
         by_width.sort_by(|a, b| width(a).total_cmp(&width(b)).then(a.cmp(b)));
         let mut last = Vec2::ZERO;
-        let (mut pairs, mut left) = (Vec::new(), Vec::new());
-        for old in std::mem::take(&mut self.olds) {
+        self.pair_up(news, |free, old| {
             let shape = &olds[old];
             let bounds = shape.bounds;
             let from = by_width.partition_point(|new| width(new) < bounds.width() - within_mm);
@@ -281,24 +269,34 @@ impl Open {
                 .take_while(|new| width(new) <= bounds.width() + within_mm)
                 .filter(|new| (news[*new].bounds.height() - bounds.height()).abs() <= within_mm)
                 .take(CANDIDATES);
-            let nearby = self.news.near(news, bounds + last).take(CANDIDATES);
-            let pair = nearby
-                .chain(of_size)
-                .filter(|new| self.news.is_free(news, *new) && may(old, *new))
-                .find_map(|new| {
-                    let shift = news[new].bounds.center() - bounds.center();
-                    let is_reversed = compare(shape, &news[new], Affine::translate(shift), within_mm)?;
-                    Some((Pair { old, new, is_reversed }, shift))
-                });
-            if let Some((pair, shift)) = pair {
+            let nearby = free.near(news, bounds + last).take(CANDIDATES);
+            let mut candidates =
+                nearby.chain(of_size).filter(|new| free.is_free(news, *new) && may(old, *new));
+            candidates.find_map(|new| {
+                let shift = news[new].bounds.center() - bounds.center();
+                let is_reversed = compare(shape, &news[new], Affine::translate(shift), within_mm)?;
                 last = shift;
-                self.news.remove(news, pair.new);
+                Some(Pair { old, new, is_reversed })
+            })
+        })
+    }
+
+    /// Pairs each old stroke with the new one that `find` names; the others stay open.
+    fn pair_up(
+        &mut self,
+        news: &[Shape<'_>],
+        mut find: impl FnMut(&Grid, usize) -> Option<Pair>,
+    ) -> Vec<Pair> {
+        let mut pairs = Vec::new();
+        let free = &mut self.news;
+        self.olds.retain(|old| {
+            let pair = find(free, *old);
+            if let Some(pair) = pair {
+                free.remove(news, pair.new);
                 pairs.push(pair);
-            } else {
-                left.push(old);
             }
-        }
-        self.olds = left;
+            pair.is_none()
+        });
         pairs
     }
 }

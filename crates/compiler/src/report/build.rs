@@ -24,6 +24,11 @@ impl BuiltOutput {
     pub fn up_to_date(file: &str) -> Self {
         Self { file: file.to_owned(), state: BuiltState::UpToDate, reason: None, changes: None }
     }
+
+    /// An output that could not be made.
+    pub fn failed(file: &str) -> Self {
+        Self { state: BuiltState::Failed, ..Self::up_to_date(file) }
+    }
 }
 
 /// What became of an output.

@@ -89,11 +89,11 @@ fn limited_by_text(compiled: &Compiled<'_>) -> String {
     };
     let blended = compiled.trajectory.blended_strokes();
     if blended > 0 {
-        let _ = writeln!(
-            text,
-            "{blended} of {} strokes keep blended corners: no spline is faster there",
-            compiled.strokes
-        );
+        let which = match compiled.strokes {
+            1 => "the stroke keeps".to_owned(),
+            all => format!("{blended} of {all} strokes keep"),
+        };
+        let _ = writeln!(text, "{which} blended corners: no spline is faster there");
     }
     text
 }

@@ -6,7 +6,7 @@ use kinematics::{Machine, MotorPos};
 
 use super::View;
 
-/// Positions in whole ticks are compared over so many rows that their rounding changes the
+/// Positions in whole ticks are differenced over a number of rows at which their rounding changes the
 /// acceleration by at most this share of its limit.
 const ROUNDING: f64 = 0.1;
 /// And over at most this many rows.

@@ -200,7 +200,7 @@ impl View<'_> {
         lines
     }
 
-    /// The plan as an animation of so many seconds, with the scene that it plays in.
+    /// The plan as an animation that lasts `turn_s` seconds, and its scene.
     pub fn animation(&self, turn_s: f64) -> (Scene, Animation) {
         let title = format!("{} on {}", self.title, self.machine.name());
         let mut scene = scene::of_plan(&title, &[], self.machine, self.header.pen_colors.clone());

@@ -144,15 +144,23 @@ fn build(arguments: &Build, jobs: &[Job], stop: &AtomicBool) -> Result<(), Failu
     let lock_path = Path::new(lock::NAME);
     let mut lock = Lock::read(lock_path);
     let mut tasks = Vec::new();
+    let mut counts: BTreeMap<BuiltState, usize> = BTreeMap::new();
     for job in jobs {
-        let made = job.inputs()?;
+        let made = match job.inputs() {
+            Ok(made) => made,
+            Err(failure) => {
+                failure.describe(&job.output);
+                *counts.entry(BuiltState::Failed).or_default() += 1;
+                session::report(|report| report.built.push(BuiltOutput::failed(&job.output)));
+                continue;
+            }
+        };
         let found = std::fs::read(&job.output).ok().map(|bytes| import::sha256(&bytes));
         let reason = lock.out_of_date(job, &made, found.as_deref());
         tasks.push(Task { job, made, reason });
     }
     let is_wanted = |task: &&Task<'_>| arguments.check || arguments.force || task.reason.is_some();
     let wanted: Vec<&Task<'_>> = tasks.iter().filter(is_wanted).collect();
-    let mut counts: BTreeMap<BuiltState, usize> = BTreeMap::new();
     counts.insert(BuiltState::UpToDate, tasks.len() - wanted.len());
     for task in tasks.iter().filter(|task| !is_wanted(task)) {
         session::report(|report| report.built.push(BuiltOutput::up_to_date(&task.job.output)));
@@ -161,12 +169,7 @@ fn build(arguments: &Build, jobs: &[Job], stop: &AtomicBool) -> Result<(), Failu
         let built = if arguments.check { compare(task, made) } else { put(task, made, &mut lock) };
         let built = built.unwrap_or_else(|failure| {
             failure.describe(&task.job.output);
-            BuiltOutput {
-                file: task.job.output.clone(),
-                state: BuiltState::Failed,
-                reason: None,
-                changes: None,
-            }
+            BuiltOutput::failed(&task.job.output)
         });
         *counts.entry(built.state).or_default() += 1;
         session::report(|report| report.built.push(built));

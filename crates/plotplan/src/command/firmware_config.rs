@@ -1,4 +1,4 @@
-//! The machine header of the firmware (`firmware/src/plotplan_firmware.h`), and the module `machine.py`
+//! The machine header of the firmware (`firmware/src/plotplan_firmware.h`), and the module `config.py`
 //! of the firmware in MicroPython, from a machine file.
 
 use std::fmt::Write as _;
@@ -104,7 +104,7 @@ const PYTHON_PINS: [[&str; 2]; 2] = [
     [r#"(5, "PC1", ("PA0", "PA1"))"#, r#"(4, ("PB6", "PB7"))"#],
 ];
 
-/// The module `machine.py`.
+/// The module `config.py`.
 fn module(machine: &Machine, drive: Option<&Drive>, ranges: [[i64; 2]; 2]) -> String {
     let name = machine.name();
     let home = machine.motor_positions(&machine.start());
