@@ -80,6 +80,7 @@ fn ruler(mechanism: impl Mechanism + 'static) -> Machine {
         max_speed_ticks_s: 1e9,
         max_acceleration_ticks_s2: 1e12,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     };
     let first = if angle { FINE.to_degrees() } else { FINE };
     Machine::new(MachineParts {
@@ -95,6 +96,8 @@ fn ruler(mechanism: impl Mechanism + 'static) -> Machine {
             lift_time_s: 0.0,
             drop_time_s: 0.0,
         },
+        pen_servo: None,
+        pen_offsets_mm: BTreeMap::new(),
         sheet: Rect::new(0.0, 0.0, 1.0, 1.0),
         start: JointPos::new(0.5, 100.0),
         period_s: 0.01,

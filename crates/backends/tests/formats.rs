@@ -39,6 +39,7 @@ fn machine(mechanism: Arc<dyn Mechanism>) -> Machine {
         max_speed_ticks_s: 1e6,
         max_acceleration_ticks_s2: 1e6,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     };
     Machine::new(MachineParts {
         name: "small".into(),
@@ -53,6 +54,8 @@ fn machine(mechanism: Arc<dyn Mechanism>) -> Machine {
             lift_time_s: 0.15,
             drop_time_s: 0.15,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(0.0, 0.0, 100.0, 100.0),
         start: JointPos::from([0.0, 0.0]),
         period_s: 0.01,

@@ -11,6 +11,7 @@ use planner::{PlacementOptions, PlanError, Settings, Surface, TimingLaw, Traject
 use verify::Certificate;
 
 use crate::layout::{Crop, cropped};
+use crate::replay::{on_carriage, on_paper};
 use crate::restart;
 use crate::same_ink::same_ink;
 
@@ -133,7 +134,8 @@ const PROGRESS_ROWS: u64 = 100_000;
 pub struct Placed {
     /// From drawing mm to machine mm.
     pub placement: Affine,
-    /// The drawing in machine mm.
+    /// The drawing in machine mm. Strokes of pens with an offset are where the mechanism goes, not where
+    /// the ink is ([`crate::replay::on_paper`]).
     pub drawing: Drawing,
     /// How far ink reaches beyond the sheet, mm; 0 if it does not.
     pub beyond_sheet_mm: f64,
@@ -150,7 +152,8 @@ pub fn place(
     options: &PlacementOptions,
     crop: Option<Crop>,
 ) -> Result<Placed, PlanError> {
-    let placed = place_on(drawing, machine, options, crop)?;
+    let mut placed = place_on(drawing, machine, options, crop)?;
+    placed.drawing = on_carriage(placed.drawing, machine);
     planner::check_reach(machine, &placed.drawing)?;
     Ok(placed)
 }
@@ -276,6 +279,9 @@ pub fn arrange(
             (ordered, Some(report))
         }
     };
+    if let Target::Machine(machine) = target {
+        drawing = on_paper(drawing, machine);
+    }
     if corner != Vec2::ZERO {
         drawing.transform(Affine::translate(-corner));
     }

@@ -1,7 +1,7 @@
 //! Plans read back: their machine, the pen's motion, the certificate recomputed.
 
-use drawing::{Drawing, Pen, Point, Span, Stroke};
-use kinematics::{Machine, MotorPos};
+use drawing::{Affine, Drawing, Pen, Point, Span, Stroke, Vec2};
+use kinematics::{Machine, MotorPos, Play};
 use plan::Row;
 use plan::file::PlanFile;
 use verify::Certificate;
@@ -31,10 +31,20 @@ impl Motion {
     /// Follows the rows through forward kinematics. Chords deviate from curves by at most `chord_mm`.
     pub fn of(rows: &[Row], machine: &Machine, chord_mm: f64) -> Self {
         let mut lines: Vec<Polyline> = Vec::new();
+        let ticks = |row: &Row| row.ticks.map(|ticks| ticks as f64);
+        let Some(first) = rows.first() else { return Self::default() };
+        let mut play = Play::new(machine, ticks(first));
         for pair in rows.windows(2) {
-            let ends = [pair[0], pair[1]].map(|row| MotorPos::from(row.ticks.map(|ticks| ticks as f64)));
-            let path = chords(machine, ends[0], ends[1], chord_mm);
             let pen = pair[0].pen;
+            let offset = machine.pen_offset_mm(pen);
+            let mut from = play.loads();
+            let mut path = vec![machine.forward_from_motors(&MotorPos(from)) + offset];
+            let corners = play.follow(ticks(&pair[1]));
+            for to in corners.into_iter().flatten().chain([play.loads()]) {
+                let chords = chords(machine, MotorPos(from), MotorPos(to), chord_mm);
+                path.extend(chords.into_iter().skip(1).map(|point| point + offset));
+                from = to;
+            }
             if lines.last().is_none_or(|line| line.pen != pen) {
                 lines.push(Polyline { pen, points: vec![path[0]] });
             }
@@ -55,6 +65,27 @@ impl Motion {
             strokes.filter_map(|line| Stroke::polyline(Pen(line.pen), line.points, Span::default()));
         Drawing { strokes: strokes.collect() }
     }
+}
+
+/// Where the mechanism goes while the pens draw `drawing`: strokes of pens with an offset are moved by it.
+pub fn on_carriage(drawing: Drawing, machine: &Machine) -> Drawing {
+    moved(drawing, |pen| -machine.pen_offset_mm(pen.0))
+}
+
+/// What the pens draw while the mechanism follows `drawing`: the inverse of [`on_carriage`].
+pub fn on_paper(drawing: Drawing, machine: &Machine) -> Drawing {
+    moved(drawing, |pen| machine.pen_offset_mm(pen.0))
+}
+
+fn moved(mut drawing: Drawing, by: impl Fn(Pen) -> Vec2) -> Drawing {
+    for stroke in &mut drawing.strokes {
+        let by = by(stroke.pen);
+        // Strokes that stay where they are keep their bits.
+        if by != Vec2::ZERO {
+            stroke.transform(Affine::translate(by));
+        }
+    }
+    drawing
 }
 
 /// The pen's path while the motors move linearly between two rows.
@@ -83,7 +114,7 @@ pub fn certify(
         drawing
     } else {
         let chord_mm = OWN_INK * tolerance_mm.max(OWN_TOLERANCE_MM);
-        own = Motion::of(&plan.table.rows, machine, chord_mm).drawing();
+        own = on_carriage(Motion::of(&plan.table.rows, machine, chord_mm).drawing(), machine);
         &own
     };
     verify::certify(machine, drawing, &plan.table.header, tolerance_mm, || {

@@ -58,14 +58,16 @@ mod coupling;
 mod linkage;
 mod machine;
 pub mod mechanism;
+mod play;
 mod position;
 mod reach;
 mod workspace;
 
 pub use coupling::{Coupling, SingularCoupling};
 pub use linkage::{Anchor, JointAffine, Linkage, Part, PartKind};
-pub use machine::{JointRange, Machine, MachineError, MachineParts, Motor, PenLimits, Quantity};
+pub use machine::{JointRange, Machine, MachineError, MachineParts, Motor, PenLimits, PenServo, Quantity};
 pub use mechanism::{Cartesian, FiveBar, JointKind, Mechanism, Polar, Polargraph, TwoLink, Unreachable};
+pub use play::{Corners, Play};
 pub use position::{JointPos, MotorPos};
 pub use reach::{Fault, OutOfReach};
 pub use workspace::reach_outlines;

@@ -1,5 +1,6 @@
 //! A whole machine: mechanism, coupling, motors, limits, pen and sheet.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use drawing::{Point, Rect, Vec2};
@@ -38,10 +39,13 @@ pub struct Motor {
     pub max_acceleration_ticks_s2: f64,
     /// Largest jerk, ticks/s³; `None` for a machine without a jerk limit.
     pub max_jerk_ticks_s3: Option<f64>,
+    /// Play between the motor and the mechanism, ticks: how far it turns after a reversal before its
+    /// load follows. 0 for none.
+    pub backlash_ticks: f64,
 }
 
 impl Motor {
-    /// A motor with offset 0, no jerk limit, and these limits in units (rad or mm) of its row of
+    /// A motor with offset 0, no jerk limit, no backlash, and these limits in units (rad or mm) of its row of
     /// `C q`: units/s and units/s².
     pub fn new(
         name: impl Into<String>,
@@ -57,6 +61,7 @@ impl Motor {
             max_speed_ticks_s: scale * max_speed_per_s,
             max_acceleration_ticks_s2: scale * max_acceleration_per_s2,
             max_jerk_ticks_s3: None,
+            backlash_ticks: 0.0,
         }
     }
 }
@@ -86,6 +91,28 @@ impl Default for PenLimits {
     }
 }
 
+/// The pulses of a servo that lifts the pen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PenServo {
+    /// Pulse with the pen up and with the pen down, us.
+    pub pulses_us: [f64; 2],
+    /// The same as angles, degrees, where the machine file states them so.
+    pub angles_deg: Option<[f64; 2]>,
+}
+
+impl PenServo {
+    /// The shortest and the longest pulse of any servo, us.
+    pub const PULSES_US: [f64; 2] = [100.0, 3000.0];
+
+    fn validate(&self) -> Result<(), MachineError> {
+        for pulse_us in self.pulses_us {
+            let [min, max] = Self::PULSES_US;
+            MachineError::require_range("a pulse of the pen's servo", pulse_us, (min, max), "us")?;
+        }
+        Ok(())
+    }
+}
+
 /// Unvalidated parameters of a machine. [`MachineParts::new`] sets what a machine file may leave out.
 #[derive(Clone, Debug)]
 pub struct MachineParts {
@@ -103,6 +130,10 @@ pub struct MachineParts {
     pub motors: [Motor; 2],
     /// The pen.
     pub pen: PenLimits,
+    /// The servo that lifts it, where one is known.
+    pub pen_servo: Option<PenServo>,
+    /// Where the tips of single pens are, relative to that of the others, machine mm, by pen number.
+    pub pen_offsets_mm: BTreeMap<u16, Vec2>,
     /// The sheet, machine mm. Its lower-left corner is the drawing's origin by default.
     pub sheet: Rect,
     /// The pose in which every plan starts; by default plans end there too.
@@ -128,6 +159,8 @@ impl MachineParts {
             coupling: [[1.0, 0.0], [0.0, 1.0]],
             motors,
             pen: PenLimits::default(),
+            pen_servo: None,
+            pen_offsets_mm: BTreeMap::new(),
             sheet,
             start: mechanism.inverse(sheet.center()).unwrap_or_default(),
             period_s: 0.01,
@@ -282,7 +315,10 @@ impl Motor {
         if !self.offset_ticks.is_finite() {
             return Err(MachineError::NotFinite { quantity: of("offset") });
         }
-        Ok(())
+        if self.backlash_ticks == 0.0 {
+            return Ok(());
+        }
+        MachineError::require_positive(of("backlash"), self.backlash_ticks)
     }
 }
 
@@ -309,6 +345,12 @@ impl MachineParts {
             return Err(MachineError::DuplicateMotorName { name: self.motors[0].name.clone() });
         }
         self.pen.validate()?;
+        if let Some(servo) = &self.pen_servo {
+            servo.validate()?;
+        }
+        if !self.pen_offsets_mm.values().all(|offset| offset.is_finite()) {
+            return Err(MachineError::NotFinite { quantity: "the offset of a pen".into() });
+        }
         MachineError::require_range("period", self.period_s, (1e-6, 10.0), "s")?;
         let sheet = self.sheet;
         if !(sheet.is_finite() && sheet.width() > 0.0 && sheet.height() > 0.0) {
@@ -389,6 +431,16 @@ impl Machine {
     /// The limits of its pen.
     pub fn pen(&self) -> &PenLimits {
         &self.parts.pen
+    }
+
+    /// Whether a motor has backlash.
+    pub fn has_backlash(&self) -> bool {
+        self.parts.motors.iter().any(|motor| motor.backlash_ticks > 0.0)
+    }
+
+    /// Where the tip of a pen is, relative to the place that [`Mechanism::forward`] gives, machine mm.
+    pub fn pen_offset_mm(&self, pen: u16) -> Vec2 {
+        self.parts.pen_offsets_mm.get(&pen).copied().unwrap_or(Vec2::ZERO)
     }
 
     /// The sheet, machine mm.

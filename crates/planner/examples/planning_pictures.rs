@@ -268,6 +268,7 @@ fn motor(name: &str, counts: f64, offset: f64, speed: f64, acceleration: f64) ->
         max_speed_ticks_s: max_speed,
         max_acceleration_ticks_s2: max_acceleration,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     }
 }
 
@@ -287,6 +288,8 @@ fn corexy() -> Result<Machine, Failure> {
             lift_time_s: 0.1,
             drop_time_s: 0.1,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start: JointPos::ZERO,
         period_s: 0.01,
@@ -309,6 +312,8 @@ fn arm() -> Result<Machine, Failure> {
             lift_time_s: 0.1,
             drop_time_s: 0.1,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(12.7, 76.2, 228.6, 355.6),
         start: JointPos::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
         period_s: 0.01,

@@ -184,10 +184,23 @@ impl GridInterval {
     /// Two intervals in place of this one, with derivatives evaluated again; `None` for travel,
     /// where nothing is gained, and for intervals that are too short.
     fn halves(&self, machine: &Machine, geometry: &PathGeometry) -> Option<[Self; 2]> {
-        let PathGeometry::Drawn(_, section) = geometry else { return None };
         if self.length <= 2.0 * SHORTEST {
             return None;
         }
+        let halves = self.divided(machine, geometry, 0.5)?;
+        // Of order 6, so it decreases by 64.
+        Some(halves.map(|half| Self { polynomial_error: self.polynomial_error / 32.0, ..half }))
+    }
+
+    /// The intervals before and after this share of it, with derivatives evaluated again; `None` for
+    /// travel.
+    pub(crate) fn divided(
+        &self,
+        machine: &Machine,
+        geometry: &PathGeometry,
+        share: f64,
+    ) -> Option<[Self; 2]> {
+        let PathGeometry::Drawn(_, section) = geometry else { return None };
         let piece = &section[self.piece];
         let at = |share: f64| {
             let t = ((self.start + share * self.length) * piece.rate).min(1.0);
@@ -197,21 +210,21 @@ impl GridInterval {
             Some((of.first, of.second, of.square_pen_speed))
         };
         let known = |k: usize| (self.first[k], self.second[k], self.square_pen_speeds[k]);
-        let places = [known(0), at(0.25)?, known(1), at(0.75)?, known(2)];
-        let half = |which: usize| {
+        let middle = if share == 0.5 { known(1) } else { at(share)? };
+        let places = [known(0), at(0.5 * share)?, middle, at(0.5 + 0.5 * share)?, known(2)];
+        let part = |which: usize, length: f64| {
             let places = [places[2 * which], places[2 * which + 1], places[2 * which + 2]];
             Self {
-                length: 0.5 * self.length,
-                start: self.start + 0.5 * which as f64 * self.length,
+                length,
+                start: if which == 0 { self.start } else { self.start + share * self.length },
                 first: places.map(|place| place.0),
                 second: places.map(|place| place.1),
                 square_pen_speeds: places.map(|place| place.2),
-                // Of order 6, so it decreases by 64; bounds over the interval hold for its halves.
-                polynomial_error: self.polynomial_error / 32.0,
+                // Bounds over the interval hold for its parts.
                 ..*self
             }
         };
-        Some([half(0), half(1)])
+        Some([part(0, share * self.length), part(1, (1.0 - share) * self.length)])
     }
 }
 

@@ -57,6 +57,7 @@
     allow(unreachable_pub, reason = "the feature `unstable` exports these items")
 )]
 
+mod backlash;
 mod error;
 mod joint_path;
 mod path;

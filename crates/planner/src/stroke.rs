@@ -1,9 +1,10 @@
 //! Planning of one stroke: the pose it starts from, and the motion along it.
 
 use drawing::{Point, Stroke};
-use kinematics::{Fault, JointPos, Machine, OutOfReach, Unreachable};
+use kinematics::{Fault, JointPos, Machine, MotorPos, OutOfReach, Unreachable};
 
 use crate::{
+    backlash,
     error::PlanError,
     joint_path::{JointPath, PathGeometry},
     path::{
@@ -47,10 +48,6 @@ const CLEARLY_FASTER: f64 = 0.92;
 const CLEARLY_SLOWER: f64 = 1.08;
 
 impl PlannedStroke {
-    pub(crate) fn end(&self) -> JointPos {
-        self.motions.last().map_or(self.start, |last| last.end)
-    }
-
     /// Periods, and seconds where those are equal.
     fn duration_key(&self) -> (u64, f64) {
         let periods = self.motions.iter().map(|motion| motion.periods).sum();
@@ -235,7 +232,11 @@ impl StrokePlanner<'_> {
     /// The fastest motion along the paths of a stroke.
     fn planned(&self, stroke: &Stroke, start: JointPos, paths: Lifted) -> PlannedStroke {
         let speed = self.settings.speed_of(self.machine, stroke.pen);
-        let motions = paths.into_iter().map(|(path, end)| self.parametrize(path, end, speed)).collect();
+        let parts = paths.into_iter().flat_map(|(path, end)| {
+            // The pen stops where a motor takes up its backlash.
+            backlash::between_reversals(self.machine, path, end)
+        });
+        let motions = parts.map(|(path, end)| self.parametrize(path, end, speed)).collect();
         PlannedStroke { start, motions, has_blends: false }
     }
 
@@ -293,6 +294,13 @@ impl StrokePlanner<'_> {
             from = to;
         }
         Ok(motions)
+    }
+
+    /// The motion of the motors across their play, by `change` ticks.
+    pub(crate) fn crossing(&self, change: MotorPos) -> PathMotion {
+        let path = backlash::crossing(self.machine, change);
+        let end = self.machine.joint_rates(&change);
+        self.parametrize(path, end, f64::INFINITY)
     }
 
     /// Time between rows, s.

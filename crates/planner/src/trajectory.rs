@@ -9,15 +9,16 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 
 use drawing::{Drawing, Line, Segment, Stroke};
-use kinematics::{JointPos, Machine, OutOfReach};
+use kinematics::{JointPos, Machine, MotorPos, OutOfReach};
 use plan::{Rounding, Row};
 use rayon::prelude::*;
 
 use crate::{
+    backlash,
     error::PlanError,
     joint_path::PathGeometry,
     rounding::AlongPath,
-    settings::{self, Settings, ToleranceBudget},
+    settings::{self, Settings, TimingLaw, ToleranceBudget},
     stroke::{PathMotion, PlannedStroke, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
 };
@@ -39,18 +40,23 @@ enum Motion {
     Path(PathMotion),
     /// The pen changes to this state (0 is up) and the motors rest for `periods`.
     Pen { pen: u16, periods: u64 },
+    /// The motors take up their backlash, and their lead over the mechanism becomes `to`, ticks.
+    TakeUp { crossing: PathMotion, from: MotorPos, to: MotorPos },
 }
 
 impl Motion {
     fn periods(&self) -> u64 {
         match self {
-            Self::Path(PathMotion { periods, .. }) | Self::Pen { periods, .. } => *periods,
+            Self::Path(PathMotion { periods, .. })
+            | Self::Pen { periods, .. }
+            | Self::TakeUp { crossing: PathMotion { periods, .. }, .. } => *periods,
         }
     }
 
     fn rows(&self) -> u64 {
         match self {
-            Self::Path(PathMotion { periods, .. }) => *periods,
+            Self::Path(PathMotion { periods, .. })
+            | Self::TakeUp { crossing: PathMotion { periods, .. }, .. } => *periods,
             Self::Pen { periods, .. } => u64::from(*periods > 0),
         }
     }
@@ -75,9 +81,9 @@ pub struct Trajectory<'a> {
 /// How the duration of a plan is divided, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Times {
-    /// The pen is down and moves (or makes a dot).
+    /// The pen is down and moves (or makes a dot), or a motor takes up its backlash.
     pub drawing_s: f64,
-    /// The pen is up and moves.
+    /// The same with the pen up.
     pub travel_s: f64,
     /// The pen is being lifted or lowered.
     pub lifting_s: f64,
@@ -155,6 +161,10 @@ pub fn plan_with_progress<'a>(
     progress: &dyn Fn(usize, usize),
 ) -> Result<Trajectory<'a>, PlanError> {
     settings::check(settings)?;
+    if machine.has_backlash() && matches!(settings.timing_law, TimingLaw::FixedDuration { .. }) {
+        let what = "backlash cannot be taken up in segments of a fixed duration: plan with another law";
+        return Err(PlanError::Setting { what });
+    }
     if drawing.is_empty() {
         return Err(PlanError::NoInk);
     }
@@ -176,6 +186,7 @@ pub fn plan_with_progress<'a>(
         (0, 1, Times::default(), LimitingConstraints::default());
     let (mut cached, mut phases) = (Some(Vec::new()), 0);
     let mut motions = trajectory.motions();
+    let mut is_down = false;
     let mut reported = 0;
     while let Some(motion) = motions.next_motion()? {
         // Batches are planned ahead of the motion that is taken.
@@ -186,7 +197,12 @@ pub fn plan_with_progress<'a>(
         }
         let time = motion.periods() as f64 * period;
         match &motion {
-            Motion::Pen { .. } => times.lifting_s += time,
+            Motion::Pen { pen, .. } => {
+                is_down = *pen != 0;
+                times.lifting_s += time;
+            }
+            Motion::TakeUp { .. } if is_down => times.drawing_s += time,
+            Motion::TakeUp { .. } => times.travel_s += time,
             Motion::Path(PathMotion { geometry: PathGeometry::Travel(..), .. }) => times.travel_s += time,
             Motion::Path(PathMotion { profile, .. }) => {
                 times.drawing_s += time;
@@ -277,10 +293,13 @@ impl Trajectory<'_> {
             t_us: 0,
             pen: 0,
             pose: self.machine.start(),
+            lead: MotorPos::ZERO,
             finished: false,
         };
         let along_path = match self.settings.rounding {
             Rounding::Nearest => None,
+            // Ticks beside the path would make motors reverse.
+            Rounding::Path if self.machine.has_backlash() => None,
             Rounding::Path => Some(Box::new(AlongPath::new(self.machine, self.settings.period_us))),
         };
         Rows { samples, along_path }
@@ -303,6 +322,7 @@ impl Trajectory<'_> {
             predicted: self.machine.start(),
             pose: self.machine.start(),
             queue: VecDeque::new(),
+            lead: MotorPos::ZERO,
             is_down: false,
             finished: false,
             blended_strokes: 0,
@@ -324,6 +344,8 @@ struct Motions<'a> {
     /// The pose after all queued motions.
     pose: JointPos,
     queue: VecDeque<Motion>,
+    /// How far the motors are ahead of the mechanism after all queued motions, ticks.
+    lead: MotorPos,
     /// Whether the pen is down after all queued motions.
     is_down: bool,
     /// Whether the travel back to the start pose is queued.
@@ -343,6 +365,7 @@ impl Motions<'_> {
             } else {
                 self.finished = true;
                 self.travel(self.planner.machine.start())?;
+                self.take_up(MotorPos::ZERO);
             }
         }
         Ok(self.queue.pop_front())
@@ -370,10 +393,37 @@ impl Motions<'_> {
         let dwell =
             whole_periods(pen.drop_time_s, self.planner.period()).max(u64::from(planned.motions.is_empty()));
         self.queue.push_back(Motion::Pen { pen: stroke.pen.0, periods: dwell });
-        self.pose = planned.end();
-        self.queue.extend(planned.motions.into_iter().map(Motion::Path));
+        self.follow(planned.motions);
         self.is_down = true;
         Ok(())
+    }
+
+    /// Queues motions from the present pose, each after the motors have taken up their backlash.
+    fn follow(&mut self, motions: Vec<PathMotion>) {
+        for motion in motions {
+            self.take_up_towards(&motion.end);
+            self.pose = motion.end;
+            self.queue.push_back(Motion::Path(motion));
+        }
+    }
+
+    /// Brings the motors that will move to their side of the play.
+    fn take_up_towards(&mut self, end: &JointPos) {
+        let machine = self.planner.machine;
+        let directions = backlash::directions(machine, &self.pose, end);
+        let lead = [0, 1].map(|motor| match directions[motor] {
+            0.0 => self.lead[motor],
+            direction => 0.5 * direction * machine.motors()[motor].backlash_ticks,
+        });
+        self.take_up(MotorPos(lead));
+    }
+
+    fn take_up(&mut self, lead: MotorPos) {
+        if lead != self.lead {
+            let crossing = self.planner.crossing(lead - self.lead);
+            self.queue.push_back(Motion::TakeUp { crossing, from: self.lead, to: lead });
+            self.lead = lead;
+        }
     }
 
     /// Lifts the pen if it is down, and travels. Travel overlaps with the lift by the time that the
@@ -390,7 +440,7 @@ impl Motions<'_> {
             let overlap = overlap.min(travel.iter().map(|travel| travel.periods).sum());
             self.queue.push_back(Motion::Pen { pen: 0, periods: whole.saturating_sub(overlap) });
         }
-        self.queue.extend(travel.into_iter().map(Motion::Path));
+        self.follow(travel);
         self.pose = to;
         Ok(())
     }
@@ -478,6 +528,8 @@ struct Samples<'a> {
     t_us: u64,
     pen: u16,
     pose: JointPos,
+    /// How far the motors are ahead of the pose, ticks.
+    lead: MotorPos,
     finished: bool,
 }
 
@@ -504,6 +556,18 @@ impl Iterator for Samples<'_> {
                     if sample.is_some() {
                         return sample;
                     }
+                }
+                Some(Motion::TakeUp { crossing, to, .. }) if self.cursor.period == crossing.periods => {
+                    self.lead = *to;
+                    self.motion = None;
+                }
+                Some(Motion::TakeUp { crossing, from, .. }) => {
+                    let change = self.cursor.pose(self.machine, crossing, &JointPos::ZERO);
+                    self.lead = *from + self.machine.motor_rates(&change);
+                    let sample = self.sample(true);
+                    self.cursor.period += 1;
+                    self.t_us += self.period_us;
+                    return Some(sample);
                 }
                 Some(Motion::Path(motion)) if self.cursor.period == motion.periods => {
                     self.pose = motion.end;
@@ -554,7 +618,7 @@ impl Cursor {
 
 impl Samples<'_> {
     fn sample(&self, may_turn: bool) -> Sample {
-        let exact = self.machine.motor_positions(&self.pose);
+        let exact = self.machine.motor_positions(&self.pose) + self.lead;
         let exact = [exact[0], exact[1]];
         let row = Row { t_us: self.t_us, pen: self.pen, ticks: exact.map(to_ticks) };
         Sample { row: ExactRow { row, exact }, pose: self.pose, may_turn }

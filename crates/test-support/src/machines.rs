@@ -34,6 +34,7 @@ pub fn motor(
         max_speed_ticks_s,
         max_acceleration_ticks_s2,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     }
 }
 
@@ -182,6 +183,8 @@ pub fn machine() -> impl Strategy<Value = Machine> {
                 coupling,
                 motors: [motor(0), motor(1)],
                 pen: PEN,
+                pen_servo: None,
+                pen_offsets_mm: std::collections::BTreeMap::new(),
                 sheet,
                 start,
                 period_s: 0.01,

@@ -183,6 +183,7 @@ mod tests {
             max_speed_ticks_s,
             max_acceleration_ticks_s2,
             max_jerk_ticks_s3: None,
+            backlash_ticks: 0.0,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Row by row: what the table says about time, pen and poses, and the two paths that it draws.
 
 use drawing::{Drawing, Point};
-use kinematics::{JointPos, Machine, MotorPos};
+use kinematics::{JointPos, Machine, MotorPos, Play};
 use plan::{Header, MOTORS, Rounding, Row};
 
 use crate::{
@@ -30,12 +30,18 @@ struct Pose {
     point: Point,
 }
 
+/// Poses between two rows, in the order of time.
+type Corners = [Option<Pose>; MOTORS];
+
 #[derive(Clone, Copy, Debug)]
 struct Previous {
     row: Row,
     index: u64,
     ticks: Pose,
     exact: Option<Pose>,
+    /// Where the pen is when a motor has taken up its backlash on the way to this row: by ticks, and by
+    /// exact positions.
+    corners: [Corners; 2],
     /// Exact motor positions, where known.
     exact_ticks: Option<[f64; MOTORS]>,
 }
@@ -115,6 +121,9 @@ pub struct Verifier<'a> {
     failures: Failures,
     rows: u64,
     previous: Option<Previous>,
+    /// The loads of motors with backlash, by ticks and by exact positions; `None` without backlash, and
+    /// before the first row.
+    plays: [Option<Play>; 2],
     event: Option<PenEvent>,
     pens: Vec<u16>,
     follows: bool,
@@ -204,6 +213,7 @@ impl<'a> Verifier<'a> {
             failures,
             rows: 0,
             previous: None,
+            plays: [None; 2],
             event: None,
             pens: Vec::new(),
             follows,
@@ -237,11 +247,13 @@ impl<'a> Verifier<'a> {
             _ => {}
         }
         let previous = self.previous;
-        let ticks = match previous {
-            Some(previous) if previous.row.ticks == row.ticks => previous.ticks,
-            _ => self.pose(row.ticks.map(|ticks| ticks as f64)),
+        let (ticks, by_ticks) = match previous {
+            Some(previous) if previous.row.ticks == row.ticks => (previous.ticks, Corners::default()),
+            _ => self.load(0, row.ticks.map(|ticks| ticks as f64)),
         };
-        let exact_pose = exact.map(|exact| self.pose(exact));
+        let of_exact = exact.map(|exact| self.load(1, exact));
+        let exact_pose = of_exact.map(|(pose, _)| pose);
+        let corners = [by_ticks, of_exact.map_or_else(Corners::default, |(_, corners)| corners)];
         let finite = |pose: &Pose| pose.point.is_finite() && pose.joints.is_finite();
         if !finite(&ticks) || exact_pose.as_ref().is_some_and(|pose| !finite(pose)) {
             self.failures.note(Violation::NotFinite, 0, 0.0, here);
@@ -253,7 +265,7 @@ impl<'a> Verifier<'a> {
             let shift = ticks.point - exact.point;
             self.largest_shift_mm = self.largest_shift_mm.max(shift.hypot2().sqrt());
         }
-        let current = Previous { row, index, ticks, exact: exact_pose, exact_ticks: exact };
+        let current = Previous { row, index, ticks, exact: exact_pose, corners, exact_ticks: exact };
         if exact.is_none() {
             self.exact = None;
         }
@@ -273,6 +285,18 @@ impl<'a> Verifier<'a> {
     fn pose(&self, ticks: [f64; MOTORS]) -> Pose {
         let joints = self.machine.joint_positions(&MotorPos::new(ticks[0], ticks[1]));
         Pose { joints, point: self.machine.mechanism().forward(&joints) }
+    }
+
+    /// The pose at the next motor positions, and those on the way: of the motors, or of their loads where
+    /// there is backlash.
+    fn load(&mut self, which: usize, motors: [f64; MOTORS]) -> (Pose, Corners) {
+        if !self.machine.has_backlash() {
+            return (self.pose(motors), Corners::default());
+        }
+        let play = self.plays[which].get_or_insert_with(|| Play::new(self.machine, motors));
+        let corners = play.follow(motors);
+        let loads = play.loads();
+        (self.pose(loads), corners.map(|corner| corner.map(|loads| self.pose(loads))))
     }
 
     fn check_joints(&mut self, pose: &Pose, here: Location) {
@@ -357,10 +381,18 @@ impl<'a> Verifier<'a> {
         let at = At { row: previous.index, t_us: before.t_us };
         if moves {
             self.update_quantization(&current.ticks);
-            draw(&mut self.after, &self.target, self.machine, &previous.ticks, &current.ticks, at);
+            let [corners, _] = &current.corners;
+            draw_via(
+                &mut self.after,
+                &self.target,
+                self.machine,
+                [&previous.ticks, &current.ticks],
+                corners,
+                at,
+            );
         }
         if let (Some(trace), Some(from), Some(to)) = (&mut self.before, &previous.exact, &current.exact) {
-            draw(trace, &self.target, self.machine, from, to, at);
+            draw_via(trace, &self.target, self.machine, [from, to], &current.corners[1], at);
         }
     }
 
@@ -541,6 +573,23 @@ impl<'a> Verifier<'a> {
             self.failures.note(Violation::ParkPose { found, expected: self.start }, 0, 0.0, here);
         }
     }
+}
+
+/// Follows the pen from one pose to the other by way of the corners, linearly in between.
+fn draw_via(
+    trace: &mut Trace,
+    target: &Target,
+    machine: &Machine,
+    [from, to]: [&Pose; 2],
+    corners: &Corners,
+    at: At,
+) {
+    let mut from = from;
+    for corner in corners.iter().flatten() {
+        draw(trace, target, machine, from, corner, at);
+        from = corner;
+    }
+    draw(trace, target, machine, from, to, at);
 }
 
 /// Follows the pen while both motors move linearly from one pose to the other.

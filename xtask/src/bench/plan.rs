@@ -210,6 +210,7 @@ fn motor(name: &str, counts: f64, speed: f64, acceleration: f64) -> Motor {
         max_speed_ticks_s: max_speed,
         max_acceleration_ticks_s2: max_acceleration,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     }
 }
 
@@ -228,6 +229,8 @@ fn corexy() -> Result<Machine> {
             lift_time_s: 0.15,
             drop_time_s: 0.15,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(0.0, 0.0, 400.0, 400.0),
         start: JointPos::ZERO,
         period_s: 0.01,
@@ -250,6 +253,8 @@ fn arm() -> Result<Machine> {
             lift_time_s: 0.15,
             drop_time_s: 0.15,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(12.7, 76.2, 228.6, 355.6),
         start: JointPos::new(std::f64::consts::FRAC_PI_2, std::f64::consts::PI),
         period_s: 0.01,

@@ -21,6 +21,8 @@ use crate::{Line, Unrepresentable, WriteError};
 
 /// How long the board lifts the pen when a session fails or stops, milliseconds.
 const LIFT_MS: u64 = 500;
+/// The board's unit of servo pulses is 1/12 us.
+const UNITS_PER_US: f64 = 12.0;
 /// The board executes a command every 4 ms at best.
 const SHORTEST_PERIOD_US: u64 = 4000;
 
@@ -34,17 +36,20 @@ pub(crate) enum Ebb {
 }
 
 impl Ebb {
-    fn encoder(self, options: EncodeOptions) -> EbbEncoder {
+    fn encoder(self, plan: &PlanSource<'_>, options: EncodeOptions) -> EbbEncoder {
         let moves = if self == Self::Stepper || options.legacy_moves {
             encode::Moves::Stepper
         } else {
             encode::Moves::Timed
         };
-        let pen = if options.pen_actuator.is_none() && options.pen_positions.is_none() {
+        let servo = plan.machine(self.name()).ok().and_then(|machine| machine.parts().pen_servo);
+        let of_machine = servo.map(|servo| servo.pulses_us.map(|us| (us * UNITS_PER_US).round()).into());
+        let positions: Option<(f64, f64)> = options.pen_positions.or(of_machine);
+        let pen = if options.pen_actuator.is_none() && positions.is_none() {
             encode::Pen::Toggle
         } else {
             // The output of the board's own pen servo, and positions well inside what servos take.
-            let (up, down) = options.pen_positions.unwrap_or((16_000.0, 12_000.0));
+            let (up, down) = positions.unwrap_or((16_000.0, 12_000.0));
             encode::Pen::Servo { up: up.max(0.0) as u16, down: down.max(0.0) as u16, pin: 4 }
         };
         EbbEncoder { moves, pen }
@@ -88,7 +93,7 @@ impl Backend for Ebb {
     }
 
     fn program(&self, plan: &PlanSource<'_>, options: &EncodeOptions) -> Result<Program, ProgramError> {
-        Program::of_table(plan.table(), Arc::new(self.encoder(*options)))
+        Program::of_table(plan.table(), Arc::new(self.encoder(plan, *options)))
     }
 
     fn write(
@@ -97,7 +102,7 @@ impl Backend for Ebb {
         options: &EncodeOptions,
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
-        let EbbEncoder { moves, pen } = self.encoder(*options);
+        let EbbEncoder { moves, pen } = self.encoder(plan, *options);
         encode::write(plan.rows(), moves, pen, out)
     }
 

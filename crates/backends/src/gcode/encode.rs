@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use std::io::Write;
 
 use drawing::{Drawing, EllipticArc, Point, Segment};
+use kinematics::PenServo;
 
 use crate::WriteError;
 use crate::{Line, Setpoint};
@@ -39,6 +40,8 @@ pub(super) enum Pen {
         /// Position with the pen down.
         down: u16,
     },
+    /// A servo whose pulses the machine file states.
+    Pulses(PenServo),
     /// The Z axis, mm.
     Z {
         /// Height with the pen up.
@@ -107,18 +110,18 @@ impl Program<'_> {
                 self.feed = f64::NAN;
                 self.push(text, wait_s);
             }
-            Pen::Servo { up, down: low } => {
-                let angle = if down { low } else { up };
+            Pen::Servo { .. } | Pen::Pulses(_) => {
+                let position = servo_position(flavour, pen, down);
                 match flavour {
-                    Flavour::Grbl | Flavour::FluidNc => self.push(format!("M3 S{angle}"), 0.0),
+                    Flavour::Grbl | Flavour::FluidNc => self.push(format!("M3 S{position}"), 0.0),
                     Flavour::Marlin => {
                         // `M280` does not wait for queued motion.
                         self.push("M400".to_owned(), 0.0);
-                        self.push(format!("M280 P0 S{angle}"), 0.0);
+                        self.push(format!("M280 P0 S{position}"), 0.0);
                     }
                     Flavour::Klipper => {
                         self.push("M400".to_owned(), 0.0);
-                        self.push(format!("SET_SERVO SERVO=pen ANGLE={angle}"), 0.0);
+                        self.push(format!("SET_SERVO SERVO=pen {position}"), 0.0);
                     }
                 }
                 let dwell = match flavour {
@@ -196,6 +199,22 @@ impl Program<'_> {
                 self.line(point, mm_s);
             }
         }
+    }
+}
+
+/// The position of a servo as the firmware takes it. Firmwares have their own ideas of how pulses
+/// depend on angles, so pulses are sent where they take them: Klipper as `WIDTH` in s, Marlin as `S`
+/// of at least 544 us. `S` of grbl has the unit that `$30` and `$31` give it: degrees if the machine file
+/// has degrees, otherwise microseconds.
+fn servo_position(flavour: Flavour, pen: Pen, down: bool) -> String {
+    let which = usize::from(down);
+    match (flavour, pen) {
+        (Flavour::Klipper, Pen::Pulses(servo)) => format!("WIDTH={:.6}", servo.pulses_us[which] * 1e-6),
+        (Flavour::Klipper, Pen::Servo { up, down: low }) => format!("ANGLE={}", [up, low][which]),
+        (_, Pen::Servo { up, down: low }) => [up, low][which].to_string(),
+        (Flavour::Marlin, Pen::Pulses(servo)) => decimal(servo.pulses_us[which], 0),
+        (_, Pen::Pulses(servo)) => decimal(servo.angles_deg.unwrap_or(servo.pulses_us)[which], 3),
+        (_, Pen::Z { .. }) => String::new(),
     }
 }
 

@@ -41,10 +41,13 @@ fn options(
     plan: &PlanSource<'_>,
     options: EncodeOptions,
 ) -> Result<encode::Options, crate::Unrepresentable> {
-    let lift = plan.machine(format)?.pen();
+    let machine = plan.machine(format)?;
+    let lift = machine.pen();
     let pen = if options.pen_actuator == Some(PenActuator::Z) {
         let (up, down) = options.pen_positions.unwrap_or((5.0, 0.0));
         encode::Pen::Z { up, down }
+    } else if let (Some(servo), None) = (machine.parts().pen_servo, options.pen_positions) {
+        encode::Pen::Pulses(servo)
     } else {
         let (up, down) = options.pen_positions.unwrap_or((40.0, 90.0));
         encode::Pen::Servo { up: up.max(0.0) as u16, down: down.max(0.0) as u16 }

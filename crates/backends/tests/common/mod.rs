@@ -93,6 +93,7 @@ pub fn machine() -> Machine {
         max_speed_ticks_s: 4000.0,
         max_acceleration_ticks_s2: 40_000.0,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     };
     Machine::new(MachineParts {
         name: "made up".into(),
@@ -107,6 +108,8 @@ pub fn machine() -> Machine {
             lift_time_s: 0.15,
             drop_time_s: 0.15,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(0.0, 0.0, 250.0, 250.0),
         start: JointPos::from([76.0, 60.0]),
         period_s: 0.01,

@@ -272,7 +272,10 @@ impl DriveTable {
             },
             models: None,
             counts_per_tick: self.counts_per_tick.unwrap_or(1.0),
-            motors: [first.motor(motors[0])?, second.motor(motors[1])?],
+            motors: [
+                first.motor(motors[0], self.arm.is_some())?,
+                second.motor(motors[1], self.arm.is_some())?,
+            ],
             arm: self.arm.as_ref().map(|arm| arm.inertia(machine)).transpose()?,
         };
         drive.validate().map_err(MachineFileError::Drive)?;
@@ -360,7 +363,9 @@ impl DriveMotorTable {
             .map(|(key, _)| key)
     }
 
-    fn motor(&self, table: &MotorTable) -> Result<MotorDrive, MachineFileError> {
+    /// The motor of a `[[motor]]` table. Its backlash is that of this table unless the drive has its own, or
+    /// the masses of an arm, whose model has none.
+    fn motor(&self, table: &MotorTable, has_masses: bool) -> Result<MotorDrive, MachineFileError> {
         if let Some(key) = self.foreign_key() {
             let reason = format!(
                 "is no key of kind {}; known there: {}",
@@ -377,7 +382,8 @@ impl DriveMotorTable {
             MotorKind::Stepper => MotorPlant::Stepper(self.stepper(counts)?),
             MotorKind::RcServo => MotorPlant::RcServo(self.rc_servo(counts)?),
         };
-        Ok(MotorDrive { plant, backlash_ticks: self.backlash.unwrap_or(0.0) })
+        let of_motor = table.backlash.filter(|_| !has_masses);
+        Ok(MotorDrive { plant, backlash_ticks: self.backlash.or(of_motor).unwrap_or(0.0) })
     }
 
     fn dc(&self, counts: (f64, Dimension)) -> Result<DcParameters, MachineFileError> {

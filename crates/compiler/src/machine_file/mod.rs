@@ -7,11 +7,12 @@ mod drive;
 mod edit;
 mod error;
 mod line;
+mod servo;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use drawing::{Point, Rect};
+use drawing::{Point, Rect, Vec2};
 use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
 use kinematics::{JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits};
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,7 @@ use simulation::Drive;
 pub use self::drive::DriveTable;
 pub use self::edit::{drive_keys, with_drive};
 pub use self::error::{MachineFileError, SyntaxError};
+use self::servo::ServoTable;
 use crate::quantity::{self, Dimension, QuantityError};
 
 /// A preset: its name, a line about it, and its file.
@@ -184,6 +186,8 @@ struct MotorTable {
     max_acceleration: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     max_jerk: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    backlash: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -194,6 +198,10 @@ struct PenTable {
     max_travel_speed: Option<String>,
     lift_time: String,
     drop_time: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    servo: Option<ServoTable>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    offset: BTreeMap<String, [String; 2]>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -282,6 +290,8 @@ impl MachineFile {
                 lift_time_s: time(&self.pen.lift_time, "pen.lift_time")?,
                 drop_time_s: time(&self.pen.drop_time, "pen.drop_time")?,
             },
+            pen_servo: self.pen.servo.as_ref().map(ServoTable::servo).transpose()?,
+            pen_offsets_mm: self.pen_offsets()?,
             sheet: Rect { x0: x, y0: y, x1: x + width, y1: y + height },
             start,
             period_s: time(&self.plan.period, "plan.period")?,
@@ -289,6 +299,29 @@ impl MachineFile {
         // A drive that cannot be shows as soon as the machine is used.
         self.drive(&machine)?;
         Ok(machine)
+    }
+
+    /// Where the tips of single pens are.
+    fn pen_offsets(&self) -> Result<BTreeMap<u16, Vec2>, MachineFileError> {
+        let mut offsets = BTreeMap::new();
+        for (pen, [x, y]) in &self.pen.offset {
+            let number = pen.parse::<u16>().ok().filter(|number| *number > 0).ok_or_else(|| {
+                MachineFileError::Invalid(format!("pen.offset: `{pen}` is not the number of a pen"))
+            })?;
+            let length = |text: &str| {
+                let key = format!("pen.offset.{pen}");
+                quantity::length_mm(text, false).map_err(|source| MachineFileError::Quantity { key, source })
+            };
+            offsets.insert(number, Vec2::new(length(x)?, length(y)?));
+        }
+        if !offsets.is_empty() && self.geometry.kind.name != "cartesian" {
+            return Err(MachineFileError::Invalid(format!(
+                "pen.offset needs a holder that does not turn, as that of a cartesian machine: that of a {} machine \
+                 turns with the mechanism",
+                self.geometry.kind.name
+            )));
+        }
+        Ok(offsets)
     }
 
     /// The start pose: a value for each joint, or the place of the pen.
@@ -487,6 +520,7 @@ impl MotorTable {
             max_speed_ticks_s: rate(&self.max_speed, 1, "max_speed")?,
             max_acceleration_ticks_s2: rate(&self.max_acceleration, 2, "max_acceleration")?,
             max_jerk_ticks_s3: self.max_jerk.as_deref().map(|text| rate(text, 3, "max_jerk")).transpose()?,
+            backlash_ticks: self.backlash.unwrap_or(0.0),
         })
     }
 }

@@ -90,12 +90,19 @@ pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Re
             feedback(described.as_ref(), index),
         );
     }
+    let [up, down] = pen_pulses(machine);
+    let _ = write!(text, "    }},\n    /* .pen: kind, up, down (us) */ {{PEN_SERVO, {up}, {down}}},\n    ");
     text.push_str(
-        "    },\n    /* .pen: kind, up, down (us) */ {PEN_SERVO, 1000, 1500},\n    \
-         /* .homing */ {{false, 0, {0, 0}, 0, 0, 0, 0}, {false, 0, {0, 0}, 0, 0, 0, 0}},\n    \
+        "/* .homing */ {{false, 0, {0, 0}, 0, 0, 0, 0}, {false, 0, {0, 0}, 0, 0, 0, 0}},\n    \
          /* .home */ {0, 0}, /* .must_home */ false,\n    /* .limits_used, .stop_used */ false, false,\n};\n",
     );
     Ok(text)
+}
+
+/// Pulses of the pen's servo with the pen up and down, us: those of the machine file, or two to adjust.
+fn pen_pulses(machine: &Machine) -> [u16; 2] {
+    let pulses_us = machine.parts().pen_servo.map_or([1000.0, 1500.0], |servo| servo.pulses_us);
+    pulses_us.map(|us| us.round() as u16)
 }
 
 /// Pins of the board of report 1 (docs/references.md): driver and encoder of each motor.
@@ -131,7 +138,8 @@ fn module(machine: &Machine, drive: Option<&Drive>, ranges: [[i64; 2]; 2]) -> St
             (motor.max_speed_ticks_s * SPEED_MARGIN).ceil(),
         );
     }
-    text.push_str(")\nSERVO = (2, 1, \"PA5\")\nPEN_UP_US = 1000\nPEN_DOWN_US = 1500\n");
+    let [up, down] = pen_pulses(machine);
+    let _ = write!(text, ")\nSERVO = (2, 1, \"PA5\")\nPEN_UP_US = {up}\nPEN_DOWN_US = {down}\n");
     text
 }
 

@@ -102,7 +102,18 @@ fn check(file: &str) -> Result<String, Failure> {
         if let Some(jerk) = motor.limits.jerk_ticks_s3 {
             let _ = write!(text, ", {jerk:.1} ticks/s3");
         }
+        let named = machine.motors().iter().find(|other| other.name == motor.limits.name);
+        if let Some(backlash) = named.map(|motor| motor.backlash_ticks).filter(|ticks| *ticks > 0.0) {
+            let _ = write!(text, ", backlash of {backlash} ticks");
+        }
         text.push('\n');
+    }
+    if let Some(servo) = machine.parts().pen_servo {
+        let [up, down] = servo.pulses_us;
+        let _ = writeln!(text, "pen servo: {up:.1} us up, {down:.1} us down");
+    }
+    for (pen, offset) in &machine.parts().pen_offsets_mm {
+        let _ = writeln!(text, "pen {pen} draws at {:.3}, {:.3} mm from the others", offset.x, offset.y);
     }
     let _ = writeln!(text, "start at ticks {}, {}", report.start_ticks[0], report.start_ticks[1]);
     if let Some(floor) = report.tick_floor_mm {

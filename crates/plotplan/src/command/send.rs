@@ -138,7 +138,9 @@ fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Pro
     } else {
         let plan = plan::file::read(&input.bytes);
         let plan = plan.with_context(|| format!("{} is not a plan that can be used", input.path));
-        (plan.map_err(Failure::Drawing)?.table, None)
+        // Its machine has the pulses of the pen's servo, if it is known.
+        let machine = super::verify::plan(input, arguments.machine.as_deref()).ok();
+        (plan.map_err(Failure::Drawing)?.table, machine.map(|(_, machine)| machine.machine))
     };
     warn_of_losses(backend, &table);
     let rows = || -> RowIter<'_> {

@@ -202,12 +202,14 @@ fn load_plan(arguments: &Simulate, input: &Input) -> Result<LoadedPlan, Failure>
         }
     }
     let drawing = if arguments.drawing.is_empty() {
-        replay::Motion::of(&plan.table.rows, &machine, OWN_INK_MM).drawing()
+        let ink = replay::Motion::of(&plan.table.rows, &machine, OWN_INK_MM).drawing();
+        replay::on_carriage(ink, &machine)
     } else {
         let inputs = Inputs::read(&arguments.drawing)?;
         let mut drawing = input::drawings(&inputs, &arguments.reading)?.drawing().clone();
         drawing.transform(Affine::new(header.placement));
-        layout::cropped(drawing, arguments.reading.layout.crop, machine.sheet())
+        let kept = layout::cropped(drawing, arguments.reading.layout.crop, machine.sheet());
+        replay::on_carriage(kept, &machine)
     };
     let (name, period_us) = (input.name.clone(), header.period_us);
     let header = header.clone();

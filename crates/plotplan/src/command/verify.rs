@@ -37,7 +37,8 @@ pub(crate) fn run(arguments: &Verify) -> Result<(), Failure> {
         mismatches.extend(other_drawing(&plan, &inputs));
         let mut drawing = input::drawings(&inputs, &arguments.reading)?.drawing().clone();
         drawing.transform(Affine::new(plan.table.header.placement));
-        Some(layout::cropped(drawing, arguments.reading.layout.crop, machine.machine.sheet()))
+        let kept = layout::cropped(drawing, arguments.reading.layout.crop, machine.machine.sheet());
+        Some(replay::on_carriage(kept, &machine.machine))
     };
     let own = plan.document.as_ref().and_then(|document| document.settings["tolerance_mm"].as_f64());
     let tolerance = arguments.tolerance.or(own).unwrap_or(DEFAULT_TOLERANCE_MM);

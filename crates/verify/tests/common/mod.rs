@@ -20,6 +20,7 @@ fn motor(name: &str, counts: f64, offset: f64, max_speed: f64, max_acceleration:
         max_speed_ticks_s: max_speed,
         max_acceleration_ticks_s2: max_acceleration,
         max_jerk_ticks_s3: None,
+        backlash_ticks: 0.0,
     }
 }
 
@@ -42,6 +43,8 @@ fn parts(
             lift_time_s: 0.15,
             drop_time_s: 0.2,
         },
+        pen_servo: None,
+        pen_offsets_mm: std::collections::BTreeMap::new(),
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start,
         period_s: 0.01,
