@@ -119,10 +119,10 @@ fn pen_with_an_offset_is_drawn_where_the_drawing_has_it() {
     let [left_2, right_2, y_2] = span("2");
     assert_eq!([left_2 - left, right_2 - right, y_2 - y], [-1600, -1600, 2000 + 400]);
     // Verified against the drawing, and shown where the ink is.
-    PROGRAM.succeed(&dir, "verify a.csv a.plt --machine two.toml");
+    PROGRAM.succeed(&dir, "verify a.csv --drawing a.plt --machine two.toml");
     PROGRAM.succeed(&dir, "preview a.csv --machine two.toml -o a.svg");
     machine(&dir, "one.toml", "cartesian", "[pen]", "[pen]");
-    let plain = PROGRAM.run(&dir, "verify a.csv a.plt --machine one.toml");
+    let plain = PROGRAM.run(&dir, "verify a.csv --drawing a.plt --machine one.toml");
     assert!(!plain.status.success(), "ink is 20 mm off without the offset");
     // Where pen 2 is right of the sheet's edge, the mechanism still reaches it.
     fs::write(dir.path().join("edge.plt"), "IN;SP2;PU11900,2000;PD12000,3000;PU;SP0;").unwrap();
@@ -142,11 +142,11 @@ fn backlash_of_the_machine_file_is_planned_and_verified() {
     let checked = PROGRAM.stdout_of(&dir, "machine check loose.toml");
     assert_eq!(checked.matches("backlash of 30 ticks").count(), 2, "{checked}");
     PROGRAM.succeed(&dir, "convert a.plt -m loose.toml -o a.json");
-    PROGRAM.succeed(&dir, "verify a.json a.plt");
+    PROGRAM.succeed(&dir, "verify a.json --drawing a.plt");
     // The same rows on the machine without backlash, and rows without lead on the one with it.
-    PROGRAM.fail(&dir, "verify a.json a.plt --machine cartesian", 1);
+    PROGRAM.fail(&dir, "verify a.json --drawing a.plt --machine cartesian", 1);
     PROGRAM.succeed(&dir, "convert a.plt -m cartesian -o b.csv");
-    PROGRAM.fail(&dir, "verify b.csv a.plt --machine loose.toml", 1);
+    PROGRAM.fail(&dir, "verify b.csv --drawing a.plt --machine loose.toml", 1);
     // Without a drawing the plan is compared with its own ink.
     PROGRAM.succeed(&dir, "verify a.json");
 }

@@ -17,7 +17,7 @@ const TOLERANCE_MM: f64 = 0.1;
 
 fn preset(name: &str) -> Machine {
     let preset = PRESETS.iter().find(|preset| preset.name == name).expect("a preset");
-    MachineFile::parse(preset.toml).unwrap().machine().unwrap()
+    MachineFile::parse(preset.toml).and_then(|file| file.machine()).expect("a machine")
 }
 
 /// With this backlash of each motor, ticks, and as jerk limit the acceleration in this time, s.
@@ -27,11 +27,11 @@ fn with_backlash(machine: &Machine, backlash_ticks: [f64; 2], jerk_s: Option<f64
         let max_jerk_ticks_s3 = jerk_s.map(|time_s| motor.max_acceleration_ticks_s2 / time_s);
         Motor { backlash_ticks: backlash_ticks[index], max_jerk_ticks_s3, ..motor }
     };
-    Machine::new(MachineParts { motors: [motor(0), motor(1)], ..machine.parts().clone() }).unwrap()
+    Machine::new(MachineParts { motors: [motor(0), motor(1)], ..machine.parts().clone() }).expect("a machine")
 }
 
 fn drawing(hpgl: &[u8]) -> Drawing {
-    import::read(hpgl, &import::Options::default()).unwrap().pages.remove(0).drawing
+    import::read(hpgl, &import::Options::default()).expect("a drawing").pages.remove(0).drawing
 }
 
 /// Curves whose motors reverse in the middle of strokes, corners, dots and travel.
@@ -64,7 +64,7 @@ fn simulated_mm(machine: &Machine, rows: &[Row], drawn: &Drawing, backlash_ticks
         motor.backlash_ticks = backlash_ticks;
     }
     let plan = Plan { machine, rows, period_us: 10_000, drawing: drawn };
-    let ink = simulate(&plan, &drive, |_| {}).unwrap().ink;
+    let ink = simulate(&plan, &drive, |_| {}).expect("a simulation").ink;
     ink.stray.max_mm.max(ink.missed.max_mm)
 }
 
@@ -121,23 +121,21 @@ fn plan_without_lead_is_refused_by_the_verifier_of_a_machine_with_backlash() {
 
 #[test]
 fn backlash_of_a_line_between_vertices_is_taken_up_at_its_ends() {
-    let machine = with_backlash(&preset("cartesian"), [20.0, 20.0], None);
+    let ideal = preset("cartesian");
+    let machine = with_backlash(&ideal, [20.0, 20.0], None);
     let request = Request { rounding: Rounding::Nearest, ..request(TimingLaw::Trapezoid) };
     let line = drawing(b"IN;SP1;PU1000,1000;PD3000,1000;PD1000,1000;PU;");
     let compiled = pipeline::compile(&line, &machine, &request, &|_| {}).unwrap();
     assert!(compiled.certificate.holds, "{:?}", compiled.certificate.failures);
     let rows: Vec<Row> = compiled.trajectory.rows().map(|row| row.row).collect();
-    let extent = |of: fn(&Row) -> bool| {
-        let x = rows.iter().filter(|row| of(row)).map(|row| row.ticks[0]);
+    let extent = |rows: &[Row]| {
+        let x = rows.iter().map(|row| row.ticks[0]);
         x.clone().max().unwrap() - x.min().unwrap()
     };
-    let ideal = preset("cartesian");
     let plain = pipeline::compile(&line, &ideal, &request, &|_| {}).unwrap();
-    let plain_ticks: Vec<i64> =
-        plain.trajectory.rows().filter(|row| row.row.pen != 0).map(|row| row.row.ticks[0]).collect();
-    let plain_extent = plain_ticks.iter().max().unwrap() - plain_ticks.iter().min().unwrap();
+    let plain: Vec<Row> = plain.trajectory.rows().map(|row| row.row).collect();
     // 10 ticks ahead in each direction.
-    assert_eq!(extent(|row| row.pen != 0), plain_extent + 20);
+    assert_eq!(extent(&rows), extent(&plain) + 20);
     assert_eq!(rows.first().unwrap().ticks, rows.last().unwrap().ticks);
 }
 

@@ -202,8 +202,9 @@ pub fn plan_with_progress<'a>(
                 times.lifting_s += time;
             }
             Motion::TakeUp { .. } if is_down => times.drawing_s += time,
-            Motion::TakeUp { .. } => times.travel_s += time,
-            Motion::Path(PathMotion { geometry: PathGeometry::Travel(..), .. }) => times.travel_s += time,
+            Motion::TakeUp { .. } | Motion::Path(PathMotion { geometry: PathGeometry::Travel(..), .. }) => {
+                times.travel_s += time;
+            }
             Motion::Path(PathMotion { profile, .. }) => {
                 times.drawing_s += time;
                 limiting.add(&profile.limiting, time / profile.duration_s);
