@@ -56,7 +56,8 @@ const STEPS: &[Step] = &[
 const PROPTEST_SEED: &str = "20261122";
 
 /// Fuzz targets (`fuzz/fuzz_targets`), seconds for each.
-const FUZZ_TARGETS: &[&str] = &["read", "emit", "svg", "recognize"];
+pub(crate) const FUZZ_TARGETS: &[&str] =
+    &["read", "emit", "svg", "recognize", "plans", "machines", "answers"];
 const FUZZ_SECONDS: u32 = 15;
 
 /// Runs the named steps, or the default ones, up to the first failure; prints the time of each.
@@ -210,22 +211,32 @@ fn fuzz() -> Result<()> {
         cargo("install cargo-fuzz --locked").context("fuzzing needs cargo-fuzz")?;
     }
     for target in FUZZ_TARGETS {
-        let seeds = crate::top().join("fuzz/corpus").join(target);
-        std::fs::create_dir_all(&seeds).with_context(|| format!("{}", seeds.display()))?;
-        let (folders, extensions, dictionary): (&[_], &[_], _) = match *target {
-            "svg" => (&["examples"], &["svg"], "svg.dict"),
-            "recognize" => (&["examples", "tests/drawings"], &["hpgl", "pcl", "svg"], "svg.dict"),
-            _ => (&["examples", "tests/drawings"], &["hpgl", "pcl"], "hpgl.dict"),
-        };
-        for folder in folders {
-            copy_drawings(&crate::top().join(folder), &seeds, extensions)?;
-        }
-        cargo(&format!(
-            "+nightly fuzz run {target} -- -dict=fuzz/{dictionary} -max_len=4096 -timeout=20 \
-             -max_total_time={FUZZ_SECONDS} -verbosity=0"
-        ))?;
+        fuzz_target(target, FUZZ_SECONDS, None)?;
     }
     Ok(())
+}
+
+/// Fuzzes one target from the project's own files.
+pub(crate) fn fuzz_target(target: &str, seconds: u32, seed: Option<u64>) -> Result<()> {
+    let seeds = crate::top().join("fuzz/corpus").join(target);
+    std::fs::create_dir_all(&seeds).with_context(|| format!("{}", seeds.display()))?;
+    let (folders, extensions, dictionary): (&[_], &[_], _) = match target {
+        "svg" => (&["examples"], &["svg"], Some("svg.dict")),
+        "recognize" => (&["examples", "tests/drawings"], &["hpgl", "pcl", "svg"], Some("svg.dict")),
+        "plans" => (&["fuzz/seeds"], &["csv", "ticks"], None),
+        "machines" => (&["crates/compiler/machines", "tests/machines"], &["toml"], None),
+        "answers" => (&["fuzz/seeds"], &["answers"], None),
+        _ => (&["examples", "tests/drawings"], &["hpgl", "pcl"], Some("hpgl.dict")),
+    };
+    for folder in folders {
+        copy_drawings(&crate::top().join(folder), &seeds, extensions)?;
+    }
+    let dictionary = dictionary.map_or_else(String::new, |file| format!("-dict=fuzz/{file}"));
+    let seed = seed.map_or_else(String::new, |seed| format!("-seed={}", seed as u32));
+    cargo(&format!(
+        "+nightly fuzz run {target} -- {dictionary} {seed} -max_len=4096 -timeout=20 \
+         -max_total_time={seconds} -verbosity=0"
+    ))
 }
 
 fn copy_drawings(from: &Path, to: &Path, extensions: &[&str]) -> Result<()> {
@@ -239,7 +250,7 @@ fn copy_drawings(from: &Path, to: &Path, extensions: &[&str]) -> Result<()> {
         }
     }
     if copied == 0 {
-        bail!("no drawings in {}", from.display());
+        bail!("no files of {extensions:?} in {}", from.display());
     }
     Ok(())
 }

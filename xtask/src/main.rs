@@ -8,11 +8,15 @@ mod bench;
 mod bound;
 mod ci;
 mod corpus;
+mod dist;
 mod firmware;
 mod order;
 mod peers;
+mod programs;
+mod site;
 mod svg_peers;
 mod tidy;
+mod trust;
 mod web_test;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
@@ -34,6 +38,17 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bound [PYTHON] [--all]
                 the fastest motion within the tolerance for a set of strokes, with casadi, which is
                 installed below target/; computes what the table of the planner's tests lacks
+  dist [TARGET …] [--deb] [--wheel] [--studio FOLDER]
+                archives with checksums, man pages and completions below target/dist, for all targets or
+                those named; the Debian package; the wheel; an archive of the studio's static files
+  version [X.Y.Z]
+                print the version of all crates, or set it
+  site [PROGRAM]
+                build the site from docs/ below target/site with mdbook, and check its links
+  trust [CAMPAIGN …] [--seed N] [--percent P]
+                the campaigns behind docs/trust.md, all or those named
+  nightly [CAMPAIGN …] [--percent P]
+                the same with a new seed
   bench order GENERATOR
                 order the drawings of the script GENERATOR (python3 with numpy); compare with
                 reference solutions
@@ -55,6 +70,14 @@ fn main() -> ExitCode {
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["ci", ref steps @ ..] => ci::run_steps(steps),
         ["tidy"] => tidy::run(),
+        ["dist", ref words @ ..] => dist::run(words),
+        ["version"] => dist::print_version(),
+        ["version", version] => dist::set_version(version),
+        ["site"] => site::run(None),
+        ["site", program] => site::run(Some(program)),
+        ["trust", "--needs"] => trust::needs(),
+        ["trust", ref words @ ..] => trust::run(words),
+        ["nightly", ref words @ ..] => trust::nightly(words),
         ["corpus", folder] => corpus::run(folder.as_ref()),
         ["bound"] => bound::run("python3", false),
         ["bound", "--all"] => bound::run("python3", true),
@@ -78,7 +101,7 @@ fn main() -> ExitCode {
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),
         _ => {
-            eprintln!("{USAGE}\nsteps of ci:\n{}", ci::list());
+            eprintln!("{USAGE}\nsteps of ci:\n{}\ncampaigns of trust:\n{}", ci::list(), trust::list());
             return ExitCode::from(2);
         }
     };

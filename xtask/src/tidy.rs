@@ -112,6 +112,8 @@ pub(crate) fn run() -> Result<bool> {
     for file in String::from_utf8_lossy(&listed.stdout).lines() {
         violations.extend(untidy(file, &std::fs::read(top.join(file)).unwrap_or_default()));
     }
+    let workspace = std::fs::read_to_string(top.join("Cargo.toml")).context("Cargo.toml")?;
+    violations.extend(crate::dist::other_versions(&workspace)?);
     for violation in &violations {
         println!("{violation}");
     }

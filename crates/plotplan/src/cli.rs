@@ -565,7 +565,7 @@ impl std::fmt::Display for FirmwareDrive {
 
 #[derive(Debug, Args)]
 pub(crate) struct Explain {
-    /// The code, such as H0101; or `plotters` for the plotters and papers that are known
+    /// The code, such as H0101; `codes` lists them, `plotters` the plotters and papers that are known
     pub(crate) code: String,
 }
 

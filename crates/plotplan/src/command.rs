@@ -50,6 +50,12 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Emulate(emulate) => emulate::run(emulate),
         Command::Machine(machine) => machine::run(machine),
         Command::Explain(explain) => {
+            if explain.code == "codes" {
+                return output::write("-", |out| {
+                    out.write_all(import::codes().as_bytes())?;
+                    Code::ALL.iter().try_for_each(|code| writeln!(out, "{} {}", code.name(), code.meaning()))
+                });
+            }
             if explain.code == "plotters" {
                 return output::write("-", |out| {
                     writeln!(out, "Plotters of files (--plotter, --made-for):\n{}", import::plotters())?;

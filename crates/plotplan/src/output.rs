@@ -7,7 +7,10 @@ use crate::failure::Failure;
 
 /// Writes the text of a command whose result is its report, unless that is wanted as JSON.
 pub(crate) fn report(text: &str) -> Result<(), Failure> {
-    if crate::session::is_json() { Ok(()) } else { write("-", |out| out.write_all(text.as_bytes())) }
+    if crate::session::is_json() {
+        return Ok(());
+    }
+    write("-", |out| out.write_all(crate::terminal::printable(text).as_bytes()))
 }
 
 /// Writes to standard output for `-`, otherwise to a temporary file beside `to` that is renamed

@@ -58,8 +58,33 @@ pub(crate) fn say(text: &str) {
 /// Prints the report of a command that writes its result elsewhere, unless it is wanted as JSON.
 pub(crate) fn report(text: &str) {
     if !session::is_json() {
-        say(text);
+        say(&printable(text));
     }
+}
+
+/// Longest line of a message, in characters. Parsers quote the line that they stop at, which may be a
+/// whole file.
+const LONGEST_LINE: usize = 2000;
+
+/// Text that may contain names and excerpts of files: control characters as escapes, so that no file sends
+/// commands to the terminal, and long lines cut.
+pub(crate) fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    let mut column = 0;
+    for character in text.chars() {
+        column = if character == '\n' { 0 } else { column + 1 };
+        match character {
+            '\n' | '\t' => printable.push(character),
+            _ if column > LONGEST_LINE => {
+                if column == LONGEST_LINE + 1 {
+                    printable.push_str("...");
+                }
+            }
+            _ if character.is_control() => printable.extend(character.escape_default()),
+            _ => printable.push(character),
+        }
+    }
+    printable
 }
 
 /// Prints an error and records it as the cause of the failure.
@@ -75,8 +100,9 @@ pub(crate) fn error_of_one(code: Code, message: &str) {
 
 /// Prints an error with its place and records it as the cause of the failure.
 pub(crate) fn error_at(code: Code, message: &str, place: Option<Place>) {
-    print_error(code, message);
-    session::failed(ErrorReport { code, message: message.to_owned(), help: None, place });
+    let message = printable(message);
+    print_error(code, &message);
+    session::failed(ErrorReport { code, message, help: None, place });
 }
 
 fn print_error(code: Code, message: &str) {
@@ -84,7 +110,7 @@ fn print_error(code: Code, message: &str) {
         let finding = Finding { severity: "error".to_owned(), ..Finding::warning(code, message) };
         always(&line_of(&finding));
     } else {
-        render(&[Group::with_title(Level::ERROR.primary_title(message))]);
+        render(&[Group::with_title(Level::ERROR.primary_title(printable(message)))]);
     }
 }
 
@@ -103,7 +129,7 @@ fn found(level: Level<'_>, finding: Finding) {
     if !style.quiet {
         match style.message_format {
             MessageFormat::Json => always(&line_of(&finding)),
-            _ => render(&[Group::with_title(level.primary_title(finding.message.clone()))]),
+            _ => render(&[Group::with_title(level.primary_title(printable(&finding.message)))]),
         }
     }
     session::found(finding);
@@ -137,7 +163,7 @@ pub(crate) fn diagnostics(input: &Input, diagnostics: &[Diagnostic]) {
         match style.message_format {
             MessageFormat::Json => always(&line_of(&Finding::of(&input.path, diagnostic))),
             _ if *of_its_kind > SHOWN_OF_A_KIND && !style.all => {}
-            MessageFormat::Short => always(&format!("{}\n", short(input, diagnostic))),
+            MessageFormat::Short => always(&format!("{}\n", printable(&short(input, diagnostic)))),
             MessageFormat::Human => long(input, diagnostic),
         }
     }
@@ -158,7 +184,7 @@ fn long(input: &Input, diagnostic: &Diagnostic) {
         Severity::Warning => Level::WARNING,
         Severity::Error => Level::ERROR,
     };
-    let mut title = diagnostic.message.clone();
+    let mut title = printable(&diagnostic.message);
     if diagnostic.count > 1 {
         title = format!("{title} (and {} more like it)", diagnostic.count - 1);
     }
@@ -167,9 +193,9 @@ fn long(input: &Input, diagnostic: &Diagnostic) {
     if let Some([line, column]) = diagnostic.line_column.filter(|_| !is_plain) {
         let mut group = Group::with_title(level.primary_title(title).id(diagnostic.code))
             .element(Origin::path(&input.path).line(line).char_column(column))
-            .element(Level::NOTE.message(&diagnostic.place));
+            .element(Level::NOTE.message(printable(&diagnostic.place)));
         if let Some(help) = &diagnostic.help {
-            group = group.element(Level::HELP.message(help));
+            group = group.element(Level::HELP.message(printable(help)));
         }
         render(&[group]);
         return;
@@ -228,7 +254,7 @@ fn excerpt(
     help: Option<&str>,
 ) {
     let window = Window::around(&input.bytes, span);
-    let title = level.primary_title(title.to_owned());
+    let title = level.primary_title(printable(title));
     let title = match id {
         Some(id) => title.id(id.to_owned()),
         None => title,
@@ -240,9 +266,9 @@ fn excerpt(
                 .line_start(window.line)
                 .annotation(AnnotationKind::Primary.span(window.marked)),
         )
-        .element(Level::NOTE.message(place));
+        .element(Level::NOTE.message(printable(place)));
     if let Some(help) = help {
-        group = group.element(Level::HELP.message(help));
+        group = group.element(Level::HELP.message(printable(help)));
     }
     render(&[group]);
 }

@@ -8,6 +8,11 @@ use super::{Diagnostic, Document, Fact, ImportError, Importer, Options, Page, Pe
 /// HP-GL has no signature: what no other importer recognizes is read as HP-GL.
 pub(super) const IMPORTER: Importer = Importer { name: "HP-GL", recognizes: |_| true, read };
 
+/// All codes with their titles.
+pub(super) fn codes() -> impl Iterator<Item = (&'static str, &'static str)> {
+    hpgl::Code::all().map(|code| (code.name(), code.title()))
+}
+
 /// The title with severity, and the explanation of a code.
 pub(super) fn explain(code: &str) -> Option<(String, &'static str)> {
     let code = hpgl::Code::from_name(code)?;

@@ -151,6 +151,13 @@ pub fn explain(code: &str) -> Option<(String, &'static str)> {
     hpgl::explain(code).or_else(|| svg::explain(code))
 }
 
+/// The codes and titles of all diagnostics of drawings, one a line, in their order.
+pub fn codes() -> String {
+    let hpgl = hpgl::codes();
+    let svg = svg::codes();
+    hpgl.chain(svg).flat_map(|(code, title)| [code, " ", title, "\n"]).collect()
+}
+
 /// The known HP-GL plotters with their papers, one a line.
 pub fn plotters() -> String {
     let mut text = String::new();

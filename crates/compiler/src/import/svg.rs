@@ -55,6 +55,11 @@ pub struct Hatch {
     pub angle_rad: f64,
 }
 
+/// All codes with their titles.
+pub(super) fn codes() -> impl Iterator<Item = (&'static str, &'static str)> {
+    svg::Code::all().map(|code| (code.name(), code.title()))
+}
+
 /// The title with severity, and the explanation of a code.
 pub(super) fn explain(code: &str) -> Option<(String, &'static str)> {
     let code = svg::Code::from_name(code)?;

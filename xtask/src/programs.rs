@@ -1,0 +1,76 @@
+//! Programs that tasks call.
+
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context as _, Result, ensure};
+
+/// Whether a program runs.
+pub(crate) fn has(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
+}
+
+/// Runs a command in the top folder, which prints for itself.
+pub(crate) fn execute(command: &mut Command) -> Result<()> {
+    let line = shown(command);
+    println!("$ {line}");
+    let status = command.current_dir(crate::top()).status().with_context(|| format!("cannot run {line}"))?;
+    ensure!(status.success(), "{line}: {status}");
+    Ok(())
+}
+
+/// The standard output of a command that must succeed.
+pub(crate) fn output_of(command: &mut Command) -> Result<Vec<u8>> {
+    let line = shown(command);
+    let output = command.output().with_context(|| format!("cannot run {line}"))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{line}: {}\n{said}", output.status);
+    Ok(output.stdout)
+}
+
+/// The standard output as text.
+pub(crate) fn text_of(command: &mut Command) -> Result<String> {
+    Ok(String::from_utf8(output_of(command)?)?)
+}
+
+fn shown(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
+}
+
+/// Writes a file and the folders that it lies in.
+pub(crate) fn write(path: &Path, contents: impl AsRef<[u8]>) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
+    }
+    std::fs::write(path, contents).with_context(|| format!("{}", path.display()))
+}
+
+/// The commands of the program and of `machine`, as its help lists them.
+pub(crate) fn commands(program: &Path) -> Result<Vec<String>> {
+    let listed = |words: &[&str]| -> Result<Vec<String>> {
+        let help = text_of(Command::new(program).args(words).arg("--help"))?;
+        let list = help.split("Commands:\n").nth(1).unwrap_or_default();
+        let names = list.lines().take_while(|line| !line.is_empty()).filter_map(|line| {
+            // A name stands two columns in, its description further.
+            line.strip_prefix("  ").filter(|line| !line.starts_with(' '))?.split_whitespace().next()
+        });
+        Ok(names.filter(|name| *name != "help").map(str::to_owned).collect())
+    };
+    let mut commands = Vec::new();
+    for name in listed(&[])? {
+        let inner = if name == "machine" { listed(&["machine"])? } else { Vec::new() };
+        commands.push(name.clone());
+        commands.extend(inner.into_iter().map(|inner| format!("{name} {inner}")));
+    }
+    ensure!(commands.len() > 10, "the help lists {} commands", commands.len());
+    Ok(commands)
+}
+
+/// The version of all crates, from the workspace's manifest.
+pub(crate) fn version() -> Result<String> {
+    let manifest = std::fs::read_to_string(crate::top().join("Cargo.toml")).context("Cargo.toml")?;
+    let table: toml::Table = manifest.parse()?;
+    let version = table["workspace"]["package"]["version"].as_str().context("a version")?;
+    Ok(version.to_owned())
+}
