@@ -10,6 +10,7 @@ mod ci;
 mod corpus;
 mod dist;
 mod firmware;
+mod inkscape;
 mod order;
 mod peers;
 mod programs;
@@ -31,6 +32,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   peers [DIR …] compare the interpretation of our drawings, and those below DIR, with hp2xx
                 (skipped if it is not installed): length and distance
   usvg DIR      compare the SVG importer with usvg on every SVG file in DIR: length and distance
+  inkscape DIR  compare the SVG importer with Inkscape's HP-GL export on every SVG file in DIR: length,
+                and again without the cause that peers.toml names (skipped if it is not installed)
   order DIR     plan every drawing below DIR in file order and in optimized order, on two machines
   web-test [PROGRAM] [--write]
                 test animated previews in a browser, written by PROGRAM or the release build; installs
@@ -87,6 +90,7 @@ fn main() -> ExitCode {
         ["firmware", ref filters @ ..] => firmware::run(filters),
         ["peers", ref folders @ ..] => peers::run(&folders.iter().map(Into::into).collect::<Vec<_>>()),
         ["usvg", folder] => svg_peers::run(folder.as_ref()),
+        ["inkscape", folder] => inkscape::run(folder.as_ref()),
         ["web-test"] => web_test::run(None, false),
         ["web-test", "--write"] => web_test::run(None, true),
         ["web-test", program] => web_test::run(Some(program), false),

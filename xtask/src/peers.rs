@@ -23,7 +23,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 const MOST_SAMPLES: f64 = 20_000.0;
 const FINEST_STEP_MM: f64 = 0.02;
 
-const NOTES: &str = include_str!("peers.toml");
+pub(crate) const NOTES: &str = include_str!("peers.toml");
 
 type Polylines = Vec<Vec<Point>>;
 
@@ -146,7 +146,7 @@ fn compare(file: &Path, work: &Path) -> Result<Row> {
     // hp2xx draws all pages on one.
     let strokes = document.pages.iter().flat_map(|page| &page.drawing.strokes);
     let mut ours: Polylines = strokes.map(|stroke| stroke.flatten(CHORD_MM)).collect();
-    let theirs = hp2xx(file, work)?.map(|text| polylines(&text));
+    let theirs = hp2xx(file, work)?.map(|text| polylines(&text, PLOTTER_UNIT_MM));
     let is_finite = |lines: &Polylines| lines.iter().flatten().all(|p| p.x.is_finite() && p.y.is_finite());
     let theirs = theirs.filter(|lines| !lines.is_empty() && is_finite(lines));
     let used = |name: &[u8; 2]| document.summary.used.iter().any(|(mnemonic, _)| mnemonic.0 == *name);
@@ -163,49 +163,51 @@ fn compare(file: &Path, work: &Path) -> Result<Row> {
     Ok(row)
 }
 
+/// Runs a command without input and output; whether it succeeds within the time.
+pub(crate) fn runs(command: &mut Command, limit: Duration) -> Result<bool> {
+    let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let mut child = child.with_context(|| format!("cannot start {}", command.get_program().display()))?;
+    let began = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(status.success());
+        }
+        if began.elapsed() > limit {
+            child.kill()?;
+            child.wait()?;
+            return Ok(false);
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
 /// The output of hp2xx for a file, as HP-GL in plotter units at true size; `None` if it fails.
 fn hp2xx(file: &Path, work: &Path) -> Result<Option<String>> {
     let output = work.join("hp2xx.hpgl");
     let _ = std::fs::remove_file(&output);
-    let mut child = Command::new("hp2xx")
-        .args(["-q", "-t", "-m", "hpgl", "-f"])
-        .args([output.as_os_str(), file.canonicalize()?.as_os_str()])
-        .current_dir(work)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .context("cannot start hp2xx")?;
-    let began = Instant::now();
-    let done = loop {
-        if let Some(status) = child.try_wait()? {
-            break status.success();
-        }
-        if began.elapsed() > LIMIT {
-            child.kill()?;
-            child.wait()?;
-            break false;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    };
+    let mut command = Command::new("hp2xx");
+    command.args(["-q", "-t", "-m", "hpgl", "-f"]);
+    command.args([output.as_os_str(), file.canonicalize()?.as_os_str()]).current_dir(work);
+    let done = runs(&mut command, LIMIT)?;
     Ok(std::fs::read(&output).ok().filter(|_| done).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
 }
 
-/// The polylines in the output of hp2xx: `PUx,y;PDx,y;...`, absolute.
-fn polylines(text: &str) -> Polylines {
+/// The polylines in the output of hp2xx or Inkscape: `PUx,y;PDx,y,x,y;...`, absolute.
+pub(crate) fn polylines(text: &str, unit_mm: f64) -> Polylines {
     let mut lines: Polylines = Vec::new();
     let mut at: Option<Point> = None;
     let mut drawing = false;
     for command in text.split(';') {
         let Some((name, rest)) = command.trim().split_at_checked(2) else { continue };
-        let mut numbers = rest.split(',').map_while(|number| number.trim().parse::<f64>().ok());
-        let (Some(x), Some(y)) = (numbers.next(), numbers.next()) else {
-            drawing &= name == "PD";
+        if !matches!(name, "PU" | "PD") {
             continue;
-        };
-        let to = Point::new(x * PLOTTER_UNIT_MM, y * PLOTTER_UNIT_MM);
-        match (name, at) {
-            ("PD", Some(from)) => {
+        }
+        let numbers = rest.split(',').map_while(|number| number.trim().parse::<f64>().ok());
+        let numbers: Vec<f64> = numbers.collect();
+        drawing &= name == "PD";
+        for pair in numbers.chunks_exact(2) {
+            let to = Point::new(pair[0] * unit_mm, pair[1] * unit_mm);
+            if let ("PD", Some(from)) = (name, at) {
                 if !drawing {
                     lines.push(vec![from]);
                 }
@@ -214,9 +216,8 @@ fn polylines(text: &str) -> Polylines {
                 }
                 drawing = true;
             }
-            _ => drawing = false,
+            at = Some(to);
         }
-        at = Some(to);
     }
     lines
 }
@@ -289,7 +290,15 @@ mod tests {
 
     #[test]
     fn polylines_of_hp2xx_output() {
-        let lines = polylines("SP1;PA;PU0.000000,0.000000;PD400.000000,0.0;PD400.0,400.0;PA;PU40,40;PD40,0;");
+        let text = "SP1;PA;PU0.000000,0.000000;PD400.000000,0.0;PD400.0,400.0;PA;PU40,40;PD40,0;";
+        let lines = polylines(text, PLOTTER_UNIT_MM);
+        assert_eq!(lines.len(), 2);
+        assert!((length(&lines) - 21.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn polylines_of_inkscape_output() {
+        let lines = polylines("IN;PU;SP1;PU0,0;PD400,0,400,400,;PU0,400;PD40,400;PU;SP0;PU0,0;IN; ", 0.025);
         assert_eq!(lines.len(), 2);
         assert!((length(&lines) - 21.0).abs() < 1e-12);
     }

@@ -23,12 +23,7 @@ const ALIKE_LENGTH: f64 = 0.01;
 
 /// Compares every SVG file of a folder; true if all ink lies on usvg's outlines.
 pub(crate) fn run(folder: &Path) -> Result<bool> {
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-        .with_context(|| format!("no folder {}", folder.display()))?
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|e| e == "svg" || e == "svgz"))
-        .collect();
-    files.sort();
+    let files = drawings(folder)?;
     println!("{:<40} {:>11} {:>11} {:>8} {:>9}", "drawing", "ours, mm", "usvg, mm", "length", "off, mm");
     let mut alike = true;
     for file in files {
@@ -56,6 +51,20 @@ pub(crate) fn run(folder: &Path) -> Result<bool> {
         }
     }
     Ok(alike)
+}
+
+/// The SVG files of a folder, or the one file.
+pub(crate) fn drawings(folder: &Path) -> Result<Vec<PathBuf>> {
+    if folder.is_file() {
+        return Ok(vec![folder.to_owned()]);
+    }
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .with_context(|| format!("no folder {}", folder.display()))?
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "svg" || e == "svgz"))
+        .collect();
+    files.sort();
+    Ok(files)
 }
 
 struct Row {
