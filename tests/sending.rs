@@ -640,6 +640,16 @@ fn pen_plotter_refusals() {
         &["send", "plan.svg", "--protocol", "hpgl", "--dry-run"],
         "plan.svg is SVG; a plotter takes HP-GL",
     );
+    // Before the port is opened: there is none of that name.
+    std::fs::write(desk.path("lo.plt"), "IN;SP1;LO5;PU0,0;PD400,0;PU;").expect("a file");
+    refused(
+        &["send", "lo.plt", "--protocol", "hpgl", "--port", "none", "--plotter", "hp7475a"],
+        "HP 7475A does not know the instruction LO",
+    );
+    refused(
+        &["send", "lo.plt", "--protocol", "hpgl", "--port", "none", "--plotter", "hp7550a"],
+        "cannot open none",
+    );
     std::fs::write(desk.path("far.hpgl"), "IN;SP1;PU0,0;PD16000,0;PU;").expect("a file");
     refused(
         &["convert", "far.hpgl", "-f", "hpgl", "--plotter", "hp7475a", "--paper", "a4"],

@@ -100,6 +100,11 @@ pub trait Backend: fmt::Debug + Send + Sync {
         Err(Unrepresentable::NotWritten { format: self.name() }.into())
     }
 
+    /// Why a program cannot be sent, as far as that is known before the machine is asked.
+    fn fault(&self, _program: &Program, _options: &SessionOptions) -> Option<String> {
+        None
+    }
+
     /// A session that sends a program, if the backend has a protocol.
     fn session(&self, _program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {
         None

@@ -20,8 +20,8 @@ pub(crate) struct Limits {
 /// Ink may lie this far beyond the limits: labels are not drawn with the plotter's own letters.
 const ROUNDING_UNITS: f64 = 1.0;
 
-/// Why the plotter cannot draw the program; `None` if it can.
-pub(crate) fn fault(program: &Program, plotter: &Plotter, limits: &Limits) -> Option<String> {
+/// Which instruction the plotter cannot execute, and why; `None` if it knows them all.
+pub(crate) fn instruction_fault(program: &Program, plotter: &Plotter) -> Option<String> {
     for line in &program.lines {
         let name = mnemonic(&line.text);
         if !name.is_empty() && !plotter.knows(&name) {
@@ -37,6 +37,14 @@ pub(crate) fn fault(program: &Program, plotter: &Plotter, limits: &Limits) -> Op
                 plotter.buffer_bytes
             ));
         }
+    }
+    None
+}
+
+/// Why the plotter cannot draw the program; `None` if it can.
+pub(crate) fn fault(program: &Program, plotter: &Plotter, limits: &Limits) -> Option<String> {
+    if let Some(why) = instruction_fault(program, plotter) {
+        return Some(why);
     }
     let ink = ink_units(program, limits)?;
     let (clip, source) = match limits.hard_clip {

@@ -75,6 +75,10 @@ impl Backend for HpGlPlotter {
         Some(Program::of_lines(lines, Arc::new(program::HpGl)))
     }
 
+    fn fault(&self, program: &Program, options: &SessionOptions) -> Option<String> {
+        check::instruction_fault(program, options.plotter.as_deref()?)
+    }
+
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
         let plotter = options.plotter.as_deref();
         if plotter.is_some_and(|plotter| !plotter.has(Handshake::Polling)) {

@@ -41,6 +41,11 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let settings = Settings { path: path.clone(), baud: arguments.baud, flow };
     // A row that does not exist is no reason to open the port.
     from_row(arguments, &program, None)?;
+    let options = session_options(arguments)?;
+    check_handshake(&options)?;
+    if let Some(why) = backend.fault(&program, &options) {
+        return Err(Failure::Drawing(anyhow::anyhow!(why)));
+    }
     let mut wire = Wire::open(settings, arguments.log.as_deref())?;
     let program = match (arguments.from, backend.status()) {
         (Some(row), Some(status)) => {
@@ -57,18 +62,6 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
         }
         _ => from_row(arguments, &program, None)?,
     };
-    let lead_us = (arguments.lead * 1e6).round() as u64;
-    let options = SessionOptions {
-        window: arguments.window,
-        lead_us,
-        plotter: plotter(arguments.plotter.as_deref())?.map(Arc::new),
-        handshake: Some(match arguments.flow {
-            Flow::None => Handshake::Polling,
-            Flow::Hardware => Handshake::Hardware,
-            Flow::Software => Handshake::XonXoff,
-        }),
-    };
-    check_handshake(&options)?;
     let Some(mut session) = backend.session(program, &options) else {
         return Err(Failure::Usage(anyhow::anyhow!("{} cannot be sent", backend.name())));
     };
@@ -76,6 +69,20 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let outcome = wire.run(&mut *session, arguments.reconnect, arguments.plan != "-");
     session::report(|report| report.sending = Some(sent(arguments, path, backend, &outcome, &*session)));
     report(&outcome, &*session, wire.is_interrupted(), backend.row_name())
+}
+
+/// How the session sends.
+fn session_options(arguments: &Send) -> Result<SessionOptions, Failure> {
+    Ok(SessionOptions {
+        window: arguments.window,
+        lead_us: (arguments.lead * 1e6).round() as u64,
+        plotter: plotter(arguments.plotter.as_deref())?.map(Arc::new),
+        handshake: Some(match arguments.flow {
+            Flow::None => Handshake::Polling,
+            Flow::Hardware => Handshake::Hardware,
+            Flow::Software => Handshake::XonXoff,
+        }),
+    })
 }
 
 /// The plotter of this name, or the one that this file describes.
