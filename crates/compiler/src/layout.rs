@@ -1,7 +1,7 @@
 //! What is drawn of a drawing, before it is placed: pens, several drawings in one, copies; and the
 //! crop after it is placed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use drawing::{Affine, Drawing, Pen, Rect, Side, Span, Vec2};
 use serde::Serialize;
@@ -144,13 +144,22 @@ pub struct ColorConflict {
     pub page: usize,
 }
 
-/// Numbers the pens of pages that are numbered by colour so that a colour has one pen in all of them.
-/// A pen keeps its number where no other colour has it.
-pub fn number_colors_together(pages: &mut [Page]) {
+/// Numbers the pens of pages that are numbered by colour (`by_color`, one for each page) so that a
+/// colour has one pen in all pages. A pen keeps its number where no other colour has it; those of the
+/// other pages always do.
+pub fn number_colors_together(pages: &mut [Page], by_color: &[bool]) {
     let mut color_of: BTreeMap<Pen, [u8; 3]> = BTreeMap::new();
-    for page in pages {
+    let mut fixed: BTreeSet<Pen> = BTreeSet::new();
+    for (page, _) in pages.iter().zip(by_color).filter(|(_, by_color)| !**by_color) {
+        fixed.extend(page.drawing.strokes.iter().map(|stroke| stroke.pen));
+        for (&pen, settings) in &page.pens {
+            color_of
+                .extend(settings.color.filter(|_| !color_of.contains_key(&pen)).map(|color| (pen, color)));
+        }
+    }
+    for (page, _) in pages.iter_mut().zip(by_color).filter(|(_, by_color)| **by_color) {
         let is_used = |pen: u16, color_of: &BTreeMap<Pen, [u8; 3]>| {
-            color_of.contains_key(&Pen(pen)) || page.pens.contains_key(&Pen(pen))
+            color_of.contains_key(&Pen(pen)) || page.pens.contains_key(&Pen(pen)) || fixed.contains(&Pen(pen))
         };
         let mut map = Vec::new();
         for (&pen, settings) in &page.pens {
@@ -270,12 +279,16 @@ mod tests {
             page
         };
         let mut pages = [with_colors(&[(1, 10), (2, 20)]), with_colors(&[(1, 20), (2, 30), (3, 10)])];
-        number_colors_together(&mut pages);
+        number_colors_together(&mut pages, &[true; 2]);
         let pens =
             |page: &Page| -> Vec<u16> { page.drawing.strokes.iter().map(|stroke| stroke.pen.0).collect() };
         assert_eq!(pens(&pages[0]), [1, 2]);
         assert_eq!(pens(&pages[1]), [2, 4, 1]);
         assert_eq!(pages[1].pens[&Pen(4)].color, Some([30, 0, 0]));
+        let mut pages = [with_colors(&[(1, 10), (2, 20)]), with_colors(&[(2, 10), (1, 30), (3, 20)])];
+        number_colors_together(&mut pages, &[true, false]);
+        assert_eq!(pens(&pages[0]), [2, 3]);
+        assert_eq!(pens(&pages[1]), [2, 1, 3]);
     }
 
     #[test]

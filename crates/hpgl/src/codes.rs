@@ -243,6 +243,9 @@ codes! {
     CUT_AT_LIMITS = 230 "H0230" Warning "cut at the plotter's limits"
         "Ink outside the hard clip limits of the plotter and paper named in the options is not drawn: the pen cannot go \
          there. Name a larger paper if it should be drawn. Without a named plotter, nothing is cut at its limits."
+    PEN_RECOLORED = 231 "H0231" Warning "pen changes its colour"
+        "PC gives a pen another colour after it has drawn. A printer draws each part in its own colour; a pen has one \
+         ink. All is drawn with that pen, and its colour is the last one."
 }
 
 #[cfg(test)]

@@ -25,6 +25,13 @@ fn vendor_commands_are_skipped_whole() {
 }
 
 #[test]
+fn change_of_a_pens_colour_is_reported() {
+    let twice = document(b"IN;PC1,255,0,0;SP1;PD400,0;PC1,0,0,255;PD400,400;SP2;PD0,0;SP1;PD0,9;");
+    assert_eq!(codes(&twice), ["H0231"]);
+    assert!(codes(&document(b"IN;PC1,9,0,0;PC1,0,0,255;SP1;PD400,0;PC2,1,2,3;PD400,400;")).is_empty());
+}
+
+#[test]
 fn white_pens_are_reported() {
     let white = document(b"IN;NP8;PC3,255,255,255;SP1;PU0,0;PD1000,0;SP3;PU0,200;FT1;RR800,400;PU;SP0;");
     assert_eq!(codes(&white), ["H0229"]);

@@ -203,17 +203,17 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     let options = arguments.options(fonts::of(arguments)?);
     let formats: Vec<&str> = inputs.0.iter().map(|input| import::format(&input.bytes)).collect();
     let mut pages = Vec::new();
-    let mut by_color = arguments.layout.pen_map.is_empty() && arguments.layout.only_pens.is_none();
+    // Numbers that an option names are those of the files.
+    let are_free = arguments.layout.pen_map.is_empty() && arguments.layout.only_pens.is_none();
+    let mut by_color = Vec::new();
     for (input, format) in inputs.0.iter().zip(&formats) {
         let mut loaded = load(input, arguments, &options.for_format(format, &formats))?;
         let mut page = loaded.document.pages.swap_remove(loaded.page);
-        by_color &= *format == "SVG" && is_numbered_by_color(&page);
+        by_color.push(are_free && *format == "SVG" && is_numbered_by_color(&page));
         layout.apply_pens(&mut page);
         pages.push(page);
     }
-    if by_color {
-        layout::number_colors_together(&mut pages);
-    }
+    layout::number_colors_together(&mut pages, &by_color);
     let pages = pages.into_iter().zip(&inputs.0).map(|(page, input)| (page, input.bytes.len())).collect();
     let is_one = formats.iter().all(|format| *format == formats[0]);
     let format = if is_one { formats[0] } else { "several formats" };

@@ -77,9 +77,12 @@ impl Pens {
         self.noted
     }
 
-    fn note(&mut self, pen: Pen) {
+    /// Records the settings of a pen that draws; its colours before and now if they differ.
+    fn note(&mut self, pen: Pen) -> Option<[[u8; 3]; 2]> {
         let now = self.single.get(&pen).copied().unwrap_or(self.all);
         let now = PenSettings { color: self.palette.colors.get(&pen).copied(), ..now };
+        let before = self.used.get(&pen).and_then(|before| before.color);
+        let colors = before.zip(now.color).filter(|(before, now)| before != now);
         self.used
             .entry(pen)
             .and_modify(|before| {
@@ -95,6 +98,7 @@ impl Pens {
             })
             .or_insert(now);
         self.noted = true;
+        colors.map(|(before, now)| [before, now])
     }
 
     /// Changes a setting of one pen, or of all.
@@ -119,7 +123,12 @@ impl Interpreter {
         if !self.pens.noted
             && let PenSelection::Holds(pen) = self.pen_selection
         {
-            self.pens.note(Pen(pen));
+            if let Some(colors) = self.pens.note(Pen(pen)) {
+                let [before, now] = colors.map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}"));
+                self.report(codes::PEN_RECOLORED, || {
+                    format!("pen {pen} was {before} and is {now} now: a pen has one colour, the last one")
+                });
+            }
             self.report_white_pen(Pen(pen));
         }
     }
