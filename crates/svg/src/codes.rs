@@ -51,8 +51,8 @@ codes! {
     UNKNOWN_ELEMENT = 112 "S0112" Warning "unknown element"
         "An element in the SVG namespace whose name is not known. It is not drawn, nor is its content."
     CSS_SKIPPED = 113 "S0113" Warning "style rule skipped"
-        "A rule of a style sheet is not supported: at-rules such as `@media` and `@import`, pseudo-classes other than \
-         `:first-child`, or selectors that are malformed. The rule has no effect."
+        "A rule of a style sheet is not supported: `@import`, `@supports`, media queries for the size of a window, \
+         selectors that are malformed, or a language other than CSS. The rule has no effect."
     BAD_REFERENCE = 114 "S0114" Warning "reference to nothing"
         "A reference names an element that is not in the file, or lies in another file. Other files are not read."
     RECURSION = 115 "S0115" Warning "element refers to itself"
@@ -93,11 +93,12 @@ codes! {
         "Text flowed into a shape by a draft of SVG 1.2, or any text where no font is given, is not drawn. Convert it to \
          paths in an editor."
     HIDDEN = 211 "S0211" Note "hidden elements"
-        "Elements with `display:none`, `visibility:hidden` or an opacity of 0 are not drawn, nor are hidden layers."
+        "Elements with `display:none`, `visibility:hidden` or an opacity of 0 are not drawn, nor are hidden layers, \
+         elements for languages other than English, and elements that require extensions."
     ZERO_WIDTH = 213 "S0213" Note "stroke without width"
         "A stroke of width 0 is invisible in every viewer and is not drawn."
     CLIP_NOT_APPLIED = 214 "S0214" Warning "clip path not applied"
-        "A clip path made of text, or one in units of the bounding box of a group, is not supported. The element is \
+        "A clip path made of text, or a shape of CSS such as `inset()` and `circle()`, is not supported. The element is \
          drawn whole."
     TOO_MANY_DASHES = 215 "S0215" Warning "dashes too fine"
         "The dashes of a stroke are so short that the drawing would have millions of them. It is drawn solid."

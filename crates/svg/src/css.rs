@@ -1,14 +1,12 @@
-//! Style sheets: rules, selectors and declarations.
-//!
-//! simplecss splits selectors into tokens; matching is done here with a bound on its work.
+//! Style sheets: rules, at-rules and declarations.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use roxmltree::Node;
-use simplecss::{AttributeOperator, SelectorToken, SelectorTokenizer};
 
 use crate::limits;
+use crate::media::{self, Media};
+use crate::selector::{Budget, Selector};
 
 /// A property and its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +17,7 @@ pub(crate) struct Declaration<'a> {
 }
 
 /// Splits at `separator` outside quotes and brackets.
-fn split(text: &str, separator: u8) -> impl Iterator<Item = &str> {
+pub(crate) fn split(text: &str, separator: u8) -> impl Iterator<Item = &str> {
     let mut rest = Some(text);
     std::iter::from_fn(move || {
         let text = rest?;
@@ -73,42 +71,13 @@ fn without_comments(text: &str) -> String {
 }
 
 #[derive(Debug)]
-enum Simple {
-    Any,
-    Type(String),
-    Id(String),
-    Class(String),
-    Exists(String),
-    Equals(String, String),
-    HasWord(String, String),
-    DashPrefix(String, String),
-    FirstChild,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Combinator {
-    None,
-    Descendant,
-    Child,
-    Adjacent,
-}
-
-/// A compound selector, and how it relates to the one before it.
-#[derive(Debug)]
-struct Compound {
-    combinator: Combinator,
-    parts: Vec<Simple>,
-}
-
-#[derive(Debug)]
 struct Rule {
-    compounds: Vec<Compound>,
-    specificity: [usize; 3],
+    selector: Selector,
     block: usize,
 }
 
 /// All style sheets of a document.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Sheet {
     rules: Vec<Rule>,
     blocks: Vec<Vec<(String, String, bool)>>,
@@ -117,32 +86,45 @@ pub(crate) struct Sheet {
     by_key: BTreeMap<String, Vec<usize>>,
     /// What is not supported, for a finding.
     pub(crate) skipped: Vec<String>,
-    steps_left: Cell<u64>,
+    budget: Budget,
 }
 
 impl Sheet {
     /// Whether matching was cut short.
     pub(crate) fn is_exhausted(&self) -> bool {
-        self.steps_left.get() == 0
+        self.budget.is_spent()
     }
 
     pub(crate) fn new() -> Self {
-        Self { steps_left: Cell::new(limits::SELECTOR_STEPS), ..Self::default() }
+        Self {
+            rules: Vec::new(),
+            blocks: Vec::new(),
+            by_key: BTreeMap::new(),
+            skipped: Vec::new(),
+            budget: Budget::new(limits::SELECTOR_STEPS),
+        }
     }
 
-    /// Adds the rules of one `style` element.
-    pub(crate) fn add(&mut self, text: &str) {
-        let text = without_comments(text);
+    /// Adds the rules of one `style` element for a list of media.
+    pub(crate) fn add(&mut self, text: &str, media: &str) {
+        match media::of(media) {
+            Media::Holds => self.rules(&without_comments(text), 0),
+            Media::Other => {}
+            Media::Unknown => self.skip(&format!("@media {media}")),
+        }
+    }
+
+    /// Notes a rule that is not supported.
+    fn skip(&mut self, rule: &str) {
+        self.skipped.push(rule.trim().chars().take(60).collect());
+    }
+
+    /// Adds the rules of a text without comments.
+    fn rules(&mut self, text: &str, depth: usize) {
         let mut rest = text.trim_start();
         while !rest.is_empty() {
             if rest.starts_with('@') {
-                let end = rest.find([';', '{']).unwrap_or(rest.len());
-                self.skipped.push(rest[..end].trim().chars().take(60).collect());
-                rest = if rest[end..].starts_with('{') {
-                    after_block(&rest[end..])
-                } else {
-                    rest.get(end + 1..).unwrap_or("")
-                };
+                rest = self.at_rule(rest, depth);
             } else if let Some(skipped) = rest.strip_prefix("<!--").or_else(|| rest.strip_prefix("-->")) {
                 rest = skipped;
             } else if let Some((selectors, block)) = rest.split_once('{') {
@@ -156,17 +138,41 @@ impl Sheet {
         }
     }
 
+    /// Reads an at-rule; what follows it.
+    fn at_rule<'t>(&mut self, text: &'t str, depth: usize) -> &'t str {
+        let end = text.find([';', '{']).unwrap_or(text.len());
+        let head = text[..end].trim();
+        let has_block = text[end..].starts_with('{');
+        let after = if has_block { after_block(&text[end..]) } else { text.get(end + 1..).unwrap_or("") };
+        let name = head.split(|c: char| !(c.is_alphanumeric() || c == '@' || c == '-')).next().unwrap_or("");
+        match name.to_ascii_lowercase().trim_start_matches("@-webkit-").trim_start_matches('@') {
+            "media" if has_block && depth < limits::AT_RULES => {
+                let block = &text[end + 1..text.len() - after.len()];
+                match media::of(&head[name.len()..]) {
+                    Media::Holds => self.rules(block.strip_suffix('}').unwrap_or(block), depth + 1),
+                    Media::Other => {}
+                    Media::Unknown => self.skip(head),
+                }
+            }
+            // No ink depends on these: fonts are reported where they are used, prefixes of selectors
+            // are ignored, animations are not run.
+            "charset" | "namespace" | "font-face" | "keyframes" | "page" => {}
+            _ => self.skip(head),
+        }
+        after
+    }
+
     fn rule(&mut self, selectors: &str, block: &str) {
         let index = self.blocks.len();
         let owned = |d: Declaration<'_>| (d.name.to_owned(), d.value.to_owned(), d.important);
         self.blocks.push(declarations(block).map(owned).collect());
         for selector in split(selectors, b',') {
-            let Some(rule) = parse(selector.trim(), index) else {
-                self.skipped.push(selector.trim().chars().take(60).collect());
+            let Some(selector) = Selector::parse(selector) else {
+                self.skip(selector);
                 continue;
             };
-            self.by_key.entry(key(&rule)).or_default().push(self.rules.len());
-            self.rules.push(rule);
+            self.by_key.entry(selector.key()).or_default().push(self.rules.len());
+            self.rules.push(Rule { selector, block: index });
         }
     }
 
@@ -185,59 +191,16 @@ impl Sheet {
         for class in node.attribute("class").unwrap_or("").split_ascii_whitespace() {
             look(&format!(".{class}"));
         }
-        found.retain(|&rule| self.matches(&self.rules[rule].compounds, node));
-        found.sort_unstable_by_key(|&rule| (self.rules[rule].specificity, rule));
+        found.retain(|&rule| self.rules[rule].selector.matches(node, &self.budget));
+        found.sort_unstable_by_key(|&rule| (self.rules[rule].selector.specificity, rule));
         found.dedup();
         let blocks = found.into_iter().map(|rule| &self.blocks[self.rules[rule].block]);
         let size = blocks.clone().map(|block| block.len() as u64).sum();
-        self.steps_left.set(self.steps_left.get().saturating_sub(size));
+        self.budget.take(size);
         blocks
             .flatten()
             .map(|(name, value, important)| Declaration { name, value, important: *important })
             .collect()
-    }
-
-    fn matches(&self, compounds: &[Compound], node: Node<'_, '_>) -> bool {
-        let steps = self.steps_left.get();
-        if steps == 0 {
-            return false;
-        }
-        self.steps_left.set(steps - 1);
-        let Some((last, before)) = compounds.split_last() else { return true };
-        if !last.parts.iter().all(|part| is(part, node)) {
-            return false;
-        }
-        match last.combinator {
-            Combinator::None => true,
-            Combinator::Descendant => {
-                node.ancestors().skip(1).filter(Node::is_element).any(|above| self.matches(before, above))
-            }
-            Combinator::Child => node.parent_element().is_some_and(|above| self.matches(before, above)),
-            Combinator::Adjacent => {
-                node.prev_sibling_element().is_some_and(|sibling| self.matches(before, sibling))
-            }
-        }
-    }
-}
-
-fn is(part: &Simple, node: Node<'_, '_>) -> bool {
-    let attribute = |name: &str| node.attributes().find(|a| a.name() == name).map(|a| a.value());
-    match part {
-        Simple::Any => true,
-        Simple::Type(name) => node.tag_name().name() == name,
-        Simple::Id(id) => node.attribute("id") == Some(id),
-        Simple::Class(class) => {
-            node.attribute("class").is_some_and(|all| all.split_ascii_whitespace().any(|one| one == class))
-        }
-        Simple::Exists(name) => attribute(name).is_some(),
-        Simple::Equals(name, value) => attribute(name) == Some(value),
-        Simple::HasWord(name, word) => {
-            attribute(name).is_some_and(|all| all.split_ascii_whitespace().any(|one| one == word))
-        }
-        Simple::DashPrefix(name, value) => attribute(name).is_some_and(|all| {
-            all.strip_prefix(value.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
-        }),
-        Simple::FirstChild => node.prev_sibling_element().is_none(),
     }
 }
 
@@ -254,73 +217,13 @@ fn after_block(text: &str) -> &str {
     ""
 }
 
-fn key(rule: &Rule) -> String {
-    let parts = rule.compounds.last().map_or(&[][..], |last| &last.parts);
-    let mut key = String::new();
-    for part in parts {
-        match part {
-            Simple::Id(id) => return format!("#{id}"),
-            Simple::Class(class) => key = format!(".{class}"),
-            Simple::Type(name) if key.is_empty() => key.clone_from(name),
-            _ => {}
-        }
-    }
-    key
-}
-
-fn parse(selector: &str, block: usize) -> Option<Rule> {
-    if selector.len() > limits::SELECTOR_BYTES {
-        return None;
-    }
-    let mut compounds = vec![Compound { combinator: Combinator::None, parts: Vec::new() }];
-    let mut specificity = [0; 3];
-    for token in SelectorTokenizer::from(selector) {
-        let (weight, part) = match token.ok()? {
-            SelectorToken::UniversalSelector => (None, Simple::Any),
-            SelectorToken::TypeSelector(name) => (Some(2), Simple::Type(name.into())),
-            SelectorToken::ClassSelector(class) => (Some(1), Simple::Class(class.into())),
-            SelectorToken::IdSelector(id) => (Some(0), Simple::Id(id.into())),
-            SelectorToken::AttributeSelector(name, operator) => {
-                let name = name.to_owned();
-                let part = match operator {
-                    AttributeOperator::Exists => Simple::Exists(name),
-                    AttributeOperator::Matches(value) => Simple::Equals(name, value.into()),
-                    AttributeOperator::Contains(value) => Simple::HasWord(name, value.into()),
-                    AttributeOperator::StartsWith(value) => Simple::DashPrefix(name, value.into()),
-                };
-                (Some(1), part)
-            }
-            SelectorToken::PseudoClass("first-child") => (Some(1), Simple::FirstChild),
-            SelectorToken::PseudoClass(_) | SelectorToken::LangPseudoClass(_) => return None,
-            combinator => {
-                let combinator = match combinator {
-                    SelectorToken::DescendantCombinator => Combinator::Descendant,
-                    SelectorToken::ChildCombinator => Combinator::Child,
-                    _ => Combinator::Adjacent,
-                };
-                compounds.push(Compound { combinator, parts: Vec::new() });
-                continue;
-            }
-        };
-        if let Some(weight) = weight {
-            specificity[weight] += 1;
-        }
-        compounds.last_mut()?.parts.push(part);
-    }
-    compounds.iter().all(|compound| !compound.parts.is_empty()).then_some(Rule {
-        compounds,
-        specificity,
-        block,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn values(css: &str, xml: &str, id: &str) -> Vec<String> {
         let mut sheet = Sheet::new();
-        sheet.add(css);
+        sheet.add(css, "");
         let document = roxmltree::Document::parse(xml).unwrap();
         let node = document.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
         sheet.matching(node).into_iter().map(|d| d.value.to_owned()).collect()
@@ -331,6 +234,17 @@ mod tests {
         let css = "#a{k:1} .b{k:2} g .b{k:3} path{k:4} *{k:5} g > .b {k:6} [d]{k:7} g+path{k:8}";
         let xml = "<svg><g><path id='a' class='x b' d='M0 0'/></g></svg>";
         assert_eq!(values(css, xml, "a"), ["5", "4", "2", "7", "3", "6", "1"]);
+    }
+
+    #[test]
+    fn media_rules_of_a_screen_hold() {
+        let css = "@media screen{path{k:1}@media print{path{k:2}}}@media print{path{k:3} g{k:4}} \
+                   @media (min-width:9px){path{k:5}} @media (prefers-color-scheme:light) {path{k:6}} path{k:7}";
+        assert_eq!(values(css, "<svg><path id='a'/></svg>", "a"), ["1", "6", "7"]);
+        let mut sheet = Sheet::new();
+        sheet.add(css, "screen");
+        sheet.add(css, "print");
+        assert_eq!(sheet.skipped, ["@media (min-width:9px)"]);
     }
 
     #[test]

@@ -18,9 +18,9 @@
 //! and drops text without a font. To recover the exact shape, every element would have to be tagged
 //! beforehand, and its transform, dashes, markers and clips computed again in `f64`: that is the
 //! resolver, next to a second one. So this crate resolves by itself, on `roxmltree` (XML,
-//! positions), `svgtypes` (paths, transforms, lengths, colours), `simplecss` (tokens of selectors)
-//! and `kurbo` (cubics). Selectors are matched here, because simplecss matches without a bound on
-//! work and counts specificity in `u8`.
+//! positions), `svgtypes` (paths, transforms, lengths, colours) and `kurbo` (cubics). Selectors are
+//! read and matched here, because simplecss lacks `:not()`, `:nth-child()`, `~` and `[a^=b]`, matches
+//! without a bound on work and counts specificity in `u8`.
 //!
 //! # Exactness
 //!
@@ -37,15 +37,18 @@
 mod attributes;
 mod clip;
 mod codes;
+mod colors;
 mod css;
 mod dashes;
 mod diagnostics;
 mod limits;
 mod markers;
+mod media;
 mod meet;
 mod output;
 mod path;
 mod pens;
+mod selector;
 mod shapes;
 mod source;
 mod structure;

@@ -21,6 +21,8 @@ pub(crate) const PIECES: u64 = 10_000_000;
 pub(crate) const SELECTOR_STEPS: u64 = 20_000_000;
 /// Bytes of one selector.
 pub(crate) const SELECTOR_BYTES: usize = 400;
+/// At-rules inside each other.
+pub(crate) const AT_RULES: usize = 20;
 /// Dashes of the whole drawing.
 pub(crate) const DASHES: u64 = 2_000_000;
 /// Crossings of hatch lines with outlines.

@@ -5,6 +5,7 @@ use roxmltree::Node;
 use svgtypes::PointsParser;
 
 use crate::path::{self, Subpath};
+use crate::style::Style;
 use crate::units::{self, Axis, Basis};
 
 /// The outline of a shape, user units.
@@ -22,15 +23,16 @@ pub(crate) fn is_shape(name: &str) -> bool {
     matches!(name, "path" | "rect" | "circle" | "ellipse" | "line" | "polyline" | "polygon")
 }
 
-/// The outline of a shape; empty where it has no extent.
-pub(crate) fn outline(name: &str, node: Node<'_, '_>, basis: Basis) -> Shape {
+/// The outline of a shape of that style; empty where it has no extent.
+pub(crate) fn outline<'a>(name: &str, node: Node<'a, '_>, style: &Style<'a>, basis: Basis) -> Shape {
     let maybe = |attribute: &str, axis| {
-        node.attribute(attribute).and_then(units::parse).map(|length| basis.user(length, axis))
+        let value = style.geometry(attribute).or_else(|| node.attribute(attribute));
+        value.and_then(units::parse).map(|length| basis.user(length, axis))
     };
     let number = |attribute: &str, axis| maybe(attribute, axis).unwrap_or(0.0);
     match name {
         "path" => {
-            let (subpaths, right) = path::parse(node.attribute("d").unwrap_or(""));
+            let (subpaths, right) = path::parse(data(node, style));
             Shape { subpaths, damaged: !right, has_vertices: true }
         }
         "polyline" | "polygon" => {
@@ -70,6 +72,15 @@ pub(crate) fn outline(name: &str, node: Node<'_, '_>, basis: Basis) -> Shape {
         }
         _ => Shape::default(),
     }
+}
+
+/// The data of a path, as its attribute or as CSS gives them (`path("M0 0")`).
+fn data<'n>(node: Node<'n, '_>, style: &Style<'n>) -> &'n str {
+    let given = style.geometry("d").and_then(|value| {
+        let inside = value.strip_prefix("path(")?.strip_suffix(')')?.trim();
+        Some(inside.trim_matches(['"', '\'']))
+    });
+    given.or_else(|| node.attribute("d")).unwrap_or("")
 }
 
 fn closed(subpath: Option<Subpath>) -> Shape {

@@ -21,7 +21,9 @@ pub fn looks_like_svg(bytes: &[u8]) -> bool {
     }
     let text = decode(&head).unwrap_or_else(|| latin1(&head));
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    if !text.starts_with('<') {
+    let starts = |tag: &str| text.get(..tag.len()).is_some_and(|head| head.eq_ignore_ascii_case(tag));
+    // A page may have drawings in it, but is none.
+    if !text.starts_with('<') || starts("<!doctype html") || starts("<html") {
         return false;
     }
     text.match_indices("svg").any(|(at, _)| {
@@ -92,4 +94,24 @@ fn declared_encoding(bytes: &[u8]) -> Option<String> {
     let value = declaration.split("encoding").nth(1)?.trim_start().strip_prefix('=')?.trim_start();
     let quote = value.chars().next().filter(|quote| "\"'".contains(*quote))?;
     value[1..].split(quote).next().map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_with_drawings_are_no_drawings() {
+        for (text, expected) in [
+            ("<svg/>", true),
+            ("\u{feff} <!-- x --><svg >", true),
+            ("<?xml version='1.0'?><s:svg\n>", true),
+            ("<!DOCTYPE svg><svg>", true),
+            ("<!doctype HTML><svg >", false),
+            ("<html><body><svg >", false),
+            ("svg <svg>", false),
+        ] {
+            assert_eq!(looks_like_svg(text.as_bytes()), expected, "{text}");
+        }
+    }
 }

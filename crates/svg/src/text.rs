@@ -212,6 +212,8 @@ impl<'a> Letters<'a> {
 fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>, letters: &[Letter<'a>]) {
     let mut at = Point::ZERO;
     let mut rest = letters;
+    let wanted = node.attribute("textLength").and_then(units::parse);
+    let wanted = wanted.map(|length| scope.basis().user(length, Axis::X)).filter(|length| *length >= 0.0);
     while !rest.is_empty() {
         let is_placed = |letter: &Letter<'_>| letter.place.iter().any(Option::is_some);
         let length = rest[1..].iter().position(is_placed).map_or(rest.len(), |next| next + 1);
@@ -236,9 +238,26 @@ fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
             let kerning = kerning(walker.options, letter, chunk.get(index + 1));
             at.x += advance(walker.options, letter) + kerning + letter.style.letter_spacing + blank;
         }
+        // Only the whole text is fitted to its length: that of several chunks does not say which.
+        let fitted = if chunk.len() == letters.len() { wanted } else { None };
+        let mut stretched = scope.clone();
+        if let Some(wanted) = fitted {
+            let has = at.x - origin.x;
+            if node.attribute("lengthAdjust") == Some("spacingAndGlyphs") && has > 0.0 {
+                let about = Affine::translate((origin.x, 0.0));
+                let stretch = Affine::scale_non_uniform(wanted / has, 1.0);
+                stretched.map = scope.map * about * stretch * about.inverse();
+            } else if chunk.len() > 1 {
+                let each = (wanted - has) / (chunk.len() - 1) as f64;
+                for (index, place) in places.iter_mut().enumerate() {
+                    place.x += each * index as f64;
+                }
+                at.x = origin.x + wanted;
+            }
+        }
         let back = first.style.anchor.share() * (at.x - origin.x);
         for (letter, place) in chunk.iter().zip(places) {
-            draw_letter(walker, node, scope, letter, Point::new(place.x - back, place.y));
+            draw_letter(walker, node, &stretched, letter, Point::new(place.x - back, place.y));
         }
         at.x -= back;
     }
@@ -246,19 +265,37 @@ fn lay_out<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>
 
 /// Draws the characters of a `textPath` along its path, each at the middle of its width.
 fn along_path<'a>(walker: &mut Walker<'a, '_>, node: Element<'a>, scope: &Scope<'a>) {
-    let Some(target) = attributes::href(node).and_then(|href| walker.target(node, href, scope)) else {
-        return;
+    let data = node.attribute("path").filter(|data| !data.trim().is_empty());
+    let target = match (data, attributes::href(node)) {
+        (Some(_), _) => None,
+        (None, Some(href)) => match walker.target(node, href, scope) {
+            Some(target) => Some(target),
+            None => return,
+        },
+        (None, None) => {
+            walker.note(codes::BAD_REFERENCE, "textPath", node, "a textPath names no path");
+            return;
+        }
     };
     let mut letters = Letters::default();
     collect(walker, node, scope, &mut letters);
     let Some(first) = letters.list.first() else { return };
-    if !report_font(walker, node, &first.style) || walker.content_scope(scope, target).is_none() {
+    let is_known = target.is_none_or(|target| walker.content_scope(scope, target).is_some());
+    if !report_font(walker, node, &first.style) || !is_known {
         return;
     }
     let basis = scope.basis();
-    let shape = shapes::outline(attributes::name(target).unwrap_or(""), target, basis);
-    let map = target.attribute("transform").and_then(attributes::transform).unwrap_or_default();
-    let pieces = shape.subpaths.iter().flat_map(|subpath| &subpath.segments);
+    let subpaths = match (data, target) {
+        (Some(data), _) => crate::path::parse(data).0,
+        (None, Some(target)) => {
+            let name = attributes::name(target).unwrap_or("");
+            shapes::outline(name, target, &Style::default(), basis).subpaths
+        }
+        (None, None) => Vec::new(),
+    };
+    let map = target.and_then(|target| target.attribute("transform")).and_then(attributes::transform);
+    let map = map.unwrap_or_default();
+    let pieces = subpaths.iter().flat_map(|subpath| &subpath.segments);
     let mut total = 0.0;
     let mut way: Vec<(f64, Lengths)> = Vec::new();
     for piece in pieces {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use drawing::{Affine, Drawing, Pen, Rect, Span};
+use drawing::{Affine, Drawing, Pen, Rect, Span, Vec2};
 use roxmltree::Node;
 
 use crate::attributes::{self, INKSCAPE};
@@ -100,6 +100,8 @@ pub(crate) struct Walker<'a, 'f> {
     stopped: bool,
     /// Where shapes and letters go instead of being drawn, while something is measured.
     pub(crate) sink: Option<Sink>,
+    /// Size of a pixel, mm.
+    px_mm: f64,
     regions: BTreeMap<regions::Key, Rc<Region>>,
     /// Styles of elements that are drawn by reference, by the element.
     styles: BTreeMap<usize, Rc<Style<'a>>>,
@@ -187,6 +189,11 @@ impl<'a> Walker<'a, '_> {
             }
             _ => {}
         }
+        if !is_chosen(node) {
+            let message = "elements for another language or an extension are not drawn";
+            self.note(codes::HIDDEN, "condition", node, message);
+            return;
+        }
         if let Some(inner) = self.enter(node, scope) {
             self.content(name, node, inner);
         }
@@ -240,6 +247,10 @@ impl<'a> Walker<'a, '_> {
                 self.report(code, "", node, || (format!("{what} is not applied"), None));
             }
         }
+        if style.clip_shape {
+            let message = "a clip path that is a shape of CSS is not applied";
+            self.note(codes::CLIP_NOT_APPLIED, "css", node, message);
+        }
         let mut inner = scope.clone();
         inner.depth += 1;
         inner.style = Rc::new(style);
@@ -257,9 +268,10 @@ impl<'a> Walker<'a, '_> {
     /// The bounding box of what an element holds, in its user units.
     fn bounds(&mut self, name: &'a str, node: Element<'a>, scope: &Scope<'a>) -> Option<Rect> {
         let inner = Scope { map: Affine::IDENTITY, clips: Rc::default(), ..scope.clone() };
-        self.sink = Some(Sink::Bounds(None));
+        // A box may be asked for while something is measured.
+        let outer = self.sink.replace(Sink::Bounds(None));
         self.content(name, node, inner);
-        match self.sink.take() {
+        match std::mem::replace(&mut self.sink, outer) {
             Some(Sink::Bounds(bounds)) => bounds,
             _ => None,
         }
@@ -288,18 +300,18 @@ impl<'a> Walker<'a, '_> {
             });
             return;
         };
-        if let Some(origin) = scope.style.transform_origin {
-            let basis = scope.basis();
-            let mut words =
-                origin.split_whitespace().zip([Axis::X, Axis::Y]).map(|(word, axis)| match word {
-                    "left" | "top" => Some(0.0),
-                    "center" => Some(0.5 * if axis == Axis::X { basis.width } else { basis.height }),
-                    "right" => Some(basis.width),
-                    "bottom" => Some(basis.height),
-                    word => units::parse(word).map(|length| basis.user(length, axis)),
-                });
-            if let (Some(Some(x)), Some(Some(y))) = (words.next(), words.next()) {
-                map = Affine::translate((x, y)) * map * Affine::translate((-x, -y));
+        let name = attributes::name(node).unwrap_or_default();
+        let frame = match scope.style.fill_box.then(|| self.bounds(name, node, scope)).flatten() {
+            Some(bounds) => bounds,
+            None => Rect::new(0.0, 0.0, scope.viewport[0], scope.viewport[1]),
+        };
+        if scope.style.transform_origin.is_some() || scope.style.fill_box {
+            let words = scope.style.transform_origin.unwrap_or("0 0");
+            if let Some(origin) = origin(words, scope.basis(), frame) {
+                map = Affine::translate(origin) * map * Affine::translate(-origin);
+            } else {
+                let message = "the transform-origin is not understood";
+                self.note(codes::BAD_VALUE, "transform-origin", node, message);
             }
         }
         scope.map *= map;
@@ -330,7 +342,7 @@ impl<'a> Walker<'a, '_> {
 
     /// Draws a shape.
     fn shape(&mut self, name: &'a str, node: Element<'a>, mut scope: Scope<'a>) {
-        let shape = shapes::outline(name, node, scope.basis());
+        let shape = shapes::outline(name, node, &scope.style, scope.basis());
         if shape.damaged {
             let attribute = if name == "path" { "d" } else { "points" };
             self.report(codes::BAD_PATH, "", node, || {
@@ -389,8 +401,29 @@ impl<'a> Walker<'a, '_> {
     }
 }
 
-/// Whether a child of `switch` is the one to draw: no extensions required, and English or no
-/// language.
+/// The point that `transform-origin` names, user units.
+fn origin(words: &str, basis: Basis, frame: Rect) -> Option<Vec2> {
+    let mut words: Vec<&str> = words.split_whitespace().take(2).collect();
+    if words.len() == 1 {
+        words.push("center");
+    }
+    if matches!(words[0], "top" | "bottom") || matches!(words[1], "left" | "right") {
+        words.swap(0, 1);
+    }
+    let basis = Basis { width: frame.width(), height: frame.height(), ..basis };
+    let place = |word: &str, axis, start: f64, size: f64| {
+        Some(match word {
+            "left" | "top" => start,
+            "center" => start + 0.5 * size,
+            "right" | "bottom" => start + size,
+            word => start + basis.user(units::parse(word)?, axis),
+        })
+    };
+    let x = place(words[0], Axis::X, frame.x0, frame.width())?;
+    Some(Vec2::new(x, place(words[1], Axis::Y, frame.y0, frame.height())?))
+}
+
+/// Whether an element is drawn: no extensions required, and English or no language.
 fn is_chosen(child: Element<'_>) -> bool {
     let no_extension = child.attribute("requiredExtensions").is_none_or(str::is_empty);
     let language = child.attribute("systemLanguage").is_none_or(|languages| {

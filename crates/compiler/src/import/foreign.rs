@@ -65,9 +65,14 @@ pub(super) fn recognize(bytes: &[u8]) -> Option<Foreign> {
     let lower = text.get(..256.min(text.len())).unwrap_or(text).to_ascii_lowercase();
     let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
     if lower.starts_with("<!doctype html") || lower.starts_with("<html") {
+        let has_svg = head.windows(4).any(|window| window.eq_ignore_ascii_case(b"<svg"));
         return Some(Foreign {
             what: "an HTML page",
-            help: "download the drawing itself, not the page around it",
+            help: if has_svg {
+                "save its svg element as a file of its own"
+            } else {
+                "download the drawing itself, not the page around it"
+            },
         });
     }
     if text.starts_with("<?xml") {
@@ -176,6 +181,7 @@ mod tests {
             (b"; made by hand\nG21\nG90\nG0 X10 Y10\nM3 S90\nG1 X20\n", "G-code"),
             (b"(header)\nN10 G21\nN20 G0X1\nN30 G1X2\n", "G-code"),
             (b"<!DOCTYPE html><html><body>404</body>", "an HTML page"),
+            (b"<HTML><svg><path/></svg>", "an HTML page"),
             (b"name = \"x\"\n[geometry]\nkind = \"polar\"\n[[motor]]\n", "a machine file"),
             (
                 b"Dear all, please find the drawing attached to this letter.",

@@ -16,7 +16,7 @@ use crate::limits;
 use crate::output::Output;
 use crate::style::Style;
 use crate::units;
-use crate::units::{CSS_DPI, MM_PER_INCH};
+use crate::units::{Basis, CSS_DPI, MM_PER_INCH};
 use crate::viewport;
 
 /// Pixels per inch in files of Illustrator.
@@ -34,7 +34,12 @@ pub(crate) fn read(tree: &Document<'_>, options: &Options<'_>, findings: &mut Fi
     let mut sheet = Sheet::new();
     for node in root.descendants().filter(|node| attributes::name(*node) == Some("style")) {
         let text: String = node.children().filter_map(|child| child.text()).collect();
-        sheet.add(&text);
+        let language = node.attribute("type").unwrap_or("").trim().to_ascii_lowercase();
+        if matches!(language.split(';').next(), Some("" | "text/css")) {
+            sheet.add(&text, node.attribute("media").unwrap_or(""));
+        } else {
+            sheet.skipped.push(format!("type=\"{language}\""));
+        }
         for skipped in std::mem::take(&mut sheet.skipped) {
             let message = || (format!("the style rule \"{skipped}\" is not supported"), None);
             findings.report(codes::CSS_SKIPPED, &skipped, || attributes::place(node), message);
@@ -59,6 +64,7 @@ pub(crate) fn read(tree: &Document<'_>, options: &Options<'_>, findings: &mut Fi
         has_layers,
         stopped: false,
         sink: None,
+        px_mm: MM_PER_INCH / CSS_DPI,
         regions: BTreeMap::new(),
         styles: BTreeMap::new(),
     };
@@ -100,8 +106,14 @@ impl<'a> Walker<'a, '_> {
     /// Draws the root element; gives the page's size if the file has one, mm.
     fn page(&mut self, root: Element<'a>) -> Option<[f64; 2]> {
         let px_mm = MM_PER_INCH / self.dpi(root);
-        let length = |name| root.attribute(name).and_then(units::parse);
-        let size = ["width", "height"].map(|name| absolute_mm(length(name)?, px_mm));
+        // CSS on a web page often gives the width of its container: only lengths count.
+        let basis = Basis { width: 0.0, height: 0.0, font_size: 16.0 };
+        let style = Style::default().of_child(root, self.sheet, basis, |_| {});
+        let length = |text: &str| absolute_mm(units::parse(text)?, px_mm);
+        let size = ["width", "height"].map(|name| {
+            style.geometry(name).and_then(length).or_else(|| root.attribute(name).and_then(length))
+        });
+        self.px_mm = px_mm;
         let view = viewport::view_box(root);
         if size.iter().any(Option::is_none) {
             let message = match (size, view.is_some()) {

@@ -1,8 +1,9 @@
 //! Strokes, fills and markers of shapes.
 
+use std::borrow::Cow;
 use std::rc::Rc;
 
-use drawing::FillRule;
+use drawing::{Affine, FillRule};
 
 use super::{Element, Scope, Walker};
 use crate::attributes;
@@ -96,24 +97,34 @@ impl<'a> Walker<'a, '_> {
             return;
         };
         let mut offset = scope.style.dash_offset;
+        let (mut subpaths, mut map) = (Cow::Borrowed(&shape.subpaths), scope.map);
+        if scope.style.non_scaling {
+            // Pixels of the page, whatever the transform.
+            subpaths = Cow::Owned(shape.subpaths.iter().map(|subpath| subpath.transformed(map)).collect());
+            for length in &mut lengths {
+                *length *= self.px_mm;
+            }
+            offset *= self.px_mm;
+            map = Affine::IDENTITY;
+        }
         let path_length = node.attribute("pathLength").and_then(|text| text.trim().parse::<f64>().ok());
         if let Some(path_length) = path_length.filter(|length| *length > 0.0) {
-            let segments = shape.subpaths.iter().flat_map(|subpath| &subpath.segments);
+            let segments = subpaths.iter().flat_map(|subpath| &subpath.segments);
             let scale = segments.map(drawing::Segment::length).sum::<f64>() / path_length;
             for length in &mut lengths {
                 *length *= scale;
             }
             offset *= scale;
         }
-        for subpath in &shape.subpaths {
+        for (subpath, solid) in subpaths.iter().zip(&shape.subpaths) {
             let Some(dashes) = dashes::cut(subpath, &lengths, offset, &mut self.output.dashes_left) else {
                 let message = "the dashes of a stroke are too fine: it is drawn solid";
                 self.note(codes::TOO_MANY_DASHES, "", node, message);
-                self.draw(node, scope, std::slice::from_ref(subpath), &ink);
+                self.draw(node, scope, std::slice::from_ref(solid), &ink);
                 continue;
             };
             for dash in dashes {
-                let pieces = dash.iter().map(|segment| segment.transformed(scope.map)).collect();
+                let pieces = dash.iter().map(|segment| segment.transformed(map)).collect();
                 if let Err(refused) = self.output.run(pieces, false, &ink) {
                     self.refused(node, refused);
                     return;
@@ -165,7 +176,7 @@ impl<'a> Walker<'a, '_> {
             if let Some(stop) = stop {
                 let style = stop.attribute("style").unwrap_or("");
                 let own = crate::css::declarations(style).find(|d| d.name == "stop-color").map(|d| d.value);
-                let color = own.or_else(|| stop.attribute("stop-color")).and_then(crate::style::color);
+                let color = own.or_else(|| stop.attribute("stop-color")).and_then(crate::colors::parse);
                 return Some(color.map_or([0; 3], |(color, _)| color));
             }
             server = *self.ids.get(attributes::href(server)?.strip_prefix('#')?)?;

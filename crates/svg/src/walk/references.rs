@@ -50,8 +50,10 @@ impl<'a> Walker<'a, '_> {
         let Some(target) = self.target(node, href, scope) else { return };
         let mut inner = Self::referring(scope, target);
         let basis = scope.basis();
-        let length =
-            |name, axis| node.attribute(name).and_then(units::parse).map(|length| basis.user(length, axis));
+        let length = |name, axis| {
+            let value = scope.style.geometry(name).or_else(|| node.attribute(name));
+            value.and_then(units::parse).map(|length| basis.user(length, axis))
+        };
         let (x, y) = (length("x", Axis::X).unwrap_or(0.0), length("y", Axis::Y).unwrap_or(0.0));
         inner.map *= Affine::translate((x, y));
         let size = [length("width", Axis::X), length("height", Axis::Y)];
@@ -71,8 +73,10 @@ impl<'a> Walker<'a, '_> {
     /// reference.
     pub(super) fn nested(&mut self, node: Element<'a>, scope: &Scope<'a>, size: Option<[Option<f64>; 2]>) {
         let basis = scope.basis();
-        let length =
-            |name, axis| node.attribute(name).and_then(units::parse).map(|length| basis.user(length, axis));
+        let length = |name, axis| {
+            let value = scope.style.geometry(name).or_else(|| node.attribute(name));
+            value.and_then(units::parse).map(|length| basis.user(length, axis))
+        };
         let [wide, high] = size.unwrap_or_default();
         let width = wide.or_else(|| length("width", Axis::X)).unwrap_or(basis.width);
         let height = high.or_else(|| length("height", Axis::Y)).unwrap_or(basis.height);

@@ -169,7 +169,7 @@ impl<'a> Walker<'a, '_> {
         if !shapes::is_shape(name) || !inner.style.visible {
             return None;
         }
-        let shape = shapes::outline(name, child, inner.basis());
+        let shape = shapes::outline(name, child, &inner.style, inner.basis());
         let outlines: Vec<Subpath> =
             shape.subpaths.iter().map(|subpath| subpath.transformed(inner.map)).collect();
         let is_far = |p: Point| !(p.x.abs() < limits::COORDINATE_MM && p.y.abs() < limits::COORDINATE_MM);
