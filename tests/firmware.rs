@@ -98,6 +98,7 @@ fn ruler(mechanism: impl Mechanism + 'static) -> Machine {
         },
         pen_servo: None,
         pen_offsets_mm: BTreeMap::new(),
+        homing: None,
         sheet: Rect::new(0.0, 0.0, 1.0, 1.0),
         start: JointPos::new(0.5, 100.0),
         period_s: 0.01,

@@ -150,3 +150,14 @@ fn backlash_of_the_machine_file_is_planned_and_verified() {
     // Without a drawing the plan is compared with its own ink.
     PROGRAM.succeed(&dir, "verify a.json");
 }
+
+#[test]
+fn every_preset_writes_every_plan_file() {
+    let dir = TestDir::new();
+    fs::write(dir.path().join("a.plt"), "IN;SP1;PU400,400;PD800,400;PU;").unwrap();
+    for preset in PRESETS {
+        for file in ["a.ticks", "a.csv", "a.json"] {
+            PROGRAM.succeed(&dir, &format!("convert a.plt -m {} --fit -o {file}", preset.name));
+        }
+    }
+}

@@ -9,6 +9,7 @@ use kinematics::Machine;
 use plan::{Header, Row, TickTable};
 
 use crate::device::Device;
+use crate::homing::{EmulatedHoming, HomingSteps};
 use crate::pen_plotter::plotter::{Handshake, Plotter};
 use crate::program::{Program, ProgramError};
 use crate::session::Session;
@@ -118,6 +119,22 @@ pub trait Backend: fmt::Debug + Send + Sync {
     /// Position reports, if the machine can be asked where it is.
     fn status(&self) -> Option<Box<dyn StatusProtocol>> {
         None
+    }
+
+    /// How the firmware is told to home this machine; `None` where it cannot, and where the machine's
+    /// homing is a pose that a person sets.
+    fn homing(&self, _machine: &Machine) -> Option<HomingSteps> {
+        None
+    }
+
+    /// Whether the machine homes itself when it is switched on, before it takes anything.
+    fn homes_itself(&self) -> bool {
+        false
+    }
+
+    /// Whether a position that the machine reports proves that it was homed.
+    fn knows_datum(&self) -> bool {
+        false
     }
 
     /// An emulated machine.
@@ -294,6 +311,8 @@ pub struct EmulatorOptions {
     pub start: Option<[i64; 2]>,
     /// Whether it was homed before.
     pub homed: bool,
+    /// How long homing takes it; `None` for a machine without `[homing]`, which knows where it is.
+    pub homing: Option<EmulatedHoming>,
     /// A machine that acknowledges before it arrives does so within this distance, mm; 0 for an ideal one.
     pub answers_within_mm: f64,
     /// Size of the receive buffer, bytes, of a machine that may have another than its own.

@@ -33,6 +33,9 @@ pub trait Device {
     /// The power fails and returns: the machine forgets everything, but for where it stands.
     fn power_cut(&mut self, _now_us: u64) {}
 
+    /// A limit switch closes.
+    fn limit(&mut self, _now_us: u64) {}
+
     /// The operator holds the machine, or lets it go.
     fn hold(&mut self, _held: bool, _now_us: u64) {}
 

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::device::Device;
+use crate::homing::SwitchFault;
 
 /// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,10 @@ pub enum Fault {
     PowerCut(u64),
     /// From this time the operator holds the machine, for this long, microseconds.
     Held(u64, u64),
+    /// At this time a limit switch closes.
+    Limit(u64),
+    /// A switch does not work while the machine homes.
+    Switch(SwitchFault),
 }
 
 /// A machine behind such a wire.
@@ -32,7 +37,7 @@ pub struct FaultInjector {
     faults: Vec<Fault>,
     answered: u64,
     received: u64,
-    /// Power cuts that have happened.
+    /// Power cuts and closed switches that have happened.
     cut: Vec<u64>,
     /// Answers on their way, with the time from which they may be heard.
     wire: VecDeque<(u64, Vec<u8>)>,
@@ -72,6 +77,10 @@ impl FaultInjector {
                 }
                 Fault::Held(at, lasts) if now_us >= *at => {
                     self.device.hold((*at..at + lasts).contains(&now_us), now_us);
+                }
+                Fault::Limit(at) if now_us >= *at && !self.cut.contains(at) => {
+                    self.cut.push(*at);
+                    self.device.limit(now_us);
                 }
                 Fault::PowerCut(at) if now_us >= *at && !self.cut.contains(at) => {
                     self.cut.push(*at);
@@ -148,7 +157,7 @@ impl FaultInjector {
             Fault::FullBuffer(at, lasts) | Fault::Unplugged(at, lasts) | Fault::Held(at, lasts) => {
                 vec![*at, at + lasts]
             }
-            Fault::PowerCut(at) => vec![*at],
+            Fault::PowerCut(at) | Fault::Limit(at) => vec![*at],
             _ => Vec::new(),
         });
         let heard = self.wire.front().map(|(heard_us, _)| *heard_us);

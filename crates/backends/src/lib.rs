@@ -12,6 +12,7 @@ mod error;
 mod fault_injection;
 pub mod gcode;
 mod halstreamer;
+pub mod homing;
 mod ink;
 mod joint_trajectory;
 mod klipper_steps;

@@ -56,6 +56,7 @@ fn machine(mechanism: Arc<dyn Mechanism>) -> Machine {
         },
         pen_servo: None,
         pen_offsets_mm: std::collections::BTreeMap::new(),
+        homing: None,
         sheet: Rect::new(0.0, 0.0, 100.0, 100.0),
         start: JointPos::from([0.0, 0.0]),
         period_s: 0.01,

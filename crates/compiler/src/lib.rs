@@ -43,6 +43,7 @@ pub mod diff;
 pub mod import;
 pub mod layout;
 pub mod machine_file;
+pub mod new_machine;
 pub mod paper;
 pub mod pipeline;
 pub mod quantity;

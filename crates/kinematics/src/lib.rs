@@ -55,6 +55,7 @@
 //! ```
 
 mod coupling;
+mod homing;
 mod linkage;
 mod machine;
 pub mod mechanism;
@@ -64,6 +65,7 @@ mod reach;
 mod workspace;
 
 pub use coupling::{Coupling, SingularCoupling};
+pub use homing::{Homing, HomingAxis, HomingMethod, HomingMove, TIMEOUT_FACTOR};
 pub use linkage::{Anchor, JointAffine, Linkage, Part, PartKind};
 pub use machine::{JointRange, Machine, MachineError, MachineParts, Motor, PenLimits, PenServo, Quantity};
 pub use mechanism::{Cartesian, FiveBar, JointKind, Mechanism, Polar, Polargraph, TwoLink, Unreachable};

@@ -7,7 +7,9 @@ use drawing::{Point, Rect, Vec2};
 use nalgebra::Matrix2;
 
 use crate::reach::CHORD_TOLERANCE;
-use crate::{Coupling, Fault, JointKind, JointPos, Mechanism, MotorPos, SingularCoupling, Unreachable};
+use crate::{
+    Coupling, Fault, Homing, JointKind, JointPos, Mechanism, MotorPos, SingularCoupling, Unreachable,
+};
 
 /// The allowed range of one joint, rad or mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +136,8 @@ pub struct MachineParts {
     pub pen_servo: Option<PenServo>,
     /// Where the tips of single pens are, relative to that of the others, machine mm, by pen number.
     pub pen_offsets_mm: BTreeMap<u16, Vec2>,
+    /// How it finds its start pose; `None` where that is somebody else's matter.
+    pub homing: Option<Homing>,
     /// The sheet, machine mm. Its lower-left corner is the drawing's origin by default.
     pub sheet: Rect,
     /// The pose in which every plan starts; by default plans end there too.
@@ -161,6 +165,7 @@ impl MachineParts {
             pen: PenLimits::default(),
             pen_servo: None,
             pen_offsets_mm: BTreeMap::new(),
+            homing: None,
             sheet,
             start: mechanism.inverse(sheet.center()).unwrap_or_default(),
             period_s: 0.01,
@@ -347,6 +352,9 @@ impl MachineParts {
         self.pen.validate()?;
         if let Some(servo) = &self.pen_servo {
             servo.validate()?;
+        }
+        for homing in self.homing.iter().flat_map(Homing::moves) {
+            homing.validate()?;
         }
         if !self.pen_offsets_mm.values().all(|offset| offset.is_finite()) {
             return Err(MachineError::NotFinite { quantity: "the offset of a pen".into() });

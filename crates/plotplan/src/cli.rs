@@ -516,6 +516,23 @@ pub(crate) enum Machine {
         #[expect(clippy::option_option, reason = "the option, and its value")]
         firmware_config: Option<Option<FirmwareDrive>>,
     },
+    /// Write a commented file for a machine of your own; asks for what the options leave open
+    New {
+        /// Kind of machine: cartesian, two-link, polar, five-bar, polargraph
+        kind: Option<String>,
+        /// File to write; `-` for standard output
+        #[arg(short, long, value_name = "FILE.toml", value_parser = name())]
+        output: String,
+        /// Name of the machine [default: that of the file]
+        #[arg(long)]
+        name: Option<String>,
+        /// An answer, such as l1=206mm; --set help=1 is an error that lists the keys
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// Ask nothing: take the defaults for what the options leave open
+        #[arg(long)]
+        defaults: bool,
+    },
     /// Check a machine file: validity, and reach of its sheet
     Check {
         /// Machine file, or the name of a preset
@@ -662,6 +679,7 @@ impl Command {
             #[cfg(unix)]
             Self::Emulate(_) => "emulate",
             Self::Machine(Machine::List) => "machine list",
+            Self::Machine(Machine::New { .. }) => "machine new",
             Self::Machine(Machine::Show { .. }) => "machine show",
             Self::Machine(Machine::Check { .. }) => "machine check",
             Self::Machine(Machine::Preview { .. }) => "machine preview",

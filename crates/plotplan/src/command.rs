@@ -8,8 +8,10 @@ mod diff;
 #[cfg(unix)]
 mod emulate;
 mod firmware_config;
+mod homing;
 mod info;
 mod machine;
+mod new_machine;
 mod page;
 mod preview;
 mod send;

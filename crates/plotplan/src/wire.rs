@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use backends::homing::HomingRun;
 use backends::status::StatusProtocol;
 use backends::{Outcome, PositionQuery, Progress, ReportedPosition, Session, Waiting};
 
@@ -123,21 +124,76 @@ impl Wire {
         &mut self,
         status: Box<dyn StatusProtocol>,
     ) -> Result<Option<[i64; 2]>, Failure> {
+        match self.ask_position(status)? {
+            ReportedPosition::At(at) => Ok(Some(at)),
+            ReportedPosition::Unknown => Ok(None),
+            ReportedPosition::Alarm(what) => Err(Failure::Io(anyhow::anyhow!(what))),
+            ReportedPosition::Silent => {
+                Err(Failure::Io(anyhow::anyhow!("the machine does not answer the query for its position")))
+            }
+        }
+    }
+
+    /// Homes the machine.
+    pub(crate) fn home(&mut self, mut run: HomingRun) -> Result<(), Failure> {
+        loop {
+            let bytes = run.transmit(self.now_us());
+            self.write(&bytes);
+            match run.outcome() {
+                Some(Ok(())) => return Ok(()),
+                Some(Err(why)) => return Err(Failure::Io(anyhow::anyhow!(why.clone()))),
+                None => {}
+            }
+            match self.events.next(REOPEN_INTERVAL) {
+                Some(Event::Received(bytes)) => {
+                    self.received(&bytes);
+                    run.receive(&bytes);
+                }
+                Some(Event::Lost(_)) => {
+                    return Err(Failure::Io(anyhow::anyhow!("{} was lost", self.settings.path)));
+                }
+                Some(Event::Interrupted) => {
+                    let bytes = run.abort();
+                    self.write(&bytes);
+                    // Closing the port at once may lose them.
+                    std::thread::sleep(REOPEN_INTERVAL);
+                    return Err(Failure::Interrupted);
+                }
+                Some(Event::Enter | Event::Pause | Event::Written) | None => {}
+            }
+        }
+    }
+
+    /// Waits for a line from the operator; `false` where standard input ends without one.
+    pub(crate) fn wait_for_enter(&mut self) -> Result<bool, Failure> {
+        let (sender, answer) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let read = std::io::stdin().read_line(&mut String::new());
+            let _ = sender.send(read.is_ok_and(|count| count > 0));
+        });
+        loop {
+            if let Ok(confirmed) = answer.try_recv() {
+                return Ok(confirmed);
+            }
+            match self.events.next(REOPEN_INTERVAL) {
+                Some(Event::Interrupted) => return Err(Failure::Interrupted),
+                Some(Event::Received(bytes)) => self.received(&bytes),
+                _ => {}
+            }
+        }
+    }
+
+    /// Asks the machine for its position.
+    pub(crate) fn ask_position(
+        &mut self,
+        status: Box<dyn StatusProtocol>,
+    ) -> Result<ReportedPosition, Failure> {
         let mut query = PositionQuery::new(status);
         loop {
             let bytes = query.transmit(self.now_us());
             self.write(&bytes);
-            match query.found() {
-                Some(ReportedPosition::At(at)) => return Ok(Some(*at)),
-                Some(ReportedPosition::Unknown) => return Ok(None),
-                Some(ReportedPosition::Alarm(what)) => {
-                    return Err(Failure::Io(anyhow::anyhow!(what.clone())));
-                }
-                Some(ReportedPosition::Silent) => {
-                    let what = "the machine does not answer the query for its position";
-                    return Err(Failure::Io(anyhow::anyhow!(what)));
-                }
-                None => {}
+            if let Some(found) = query.found() {
+                return Ok(found.clone());
             }
             let within = Duration::from_micros(query.wake_us().saturating_sub(self.now_us()));
             match self.events.next(within.min(Duration::from_millis(500))) {

@@ -185,6 +185,7 @@ pub fn machine() -> impl Strategy<Value = Machine> {
                 pen: PEN,
                 pen_servo: None,
                 pen_offsets_mm: std::collections::BTreeMap::new(),
+                homing: None,
                 sheet,
                 start,
                 period_s: 0.01,

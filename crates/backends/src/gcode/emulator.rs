@@ -5,7 +5,9 @@
 
 use std::collections::VecDeque;
 
+use crate::backend::EmulatorOptions;
 use crate::device::{Device, Port};
+use crate::homing::{Datum, EmulatedHoming, SwitchFault};
 
 /// Its receive buffer, bytes.
 const BUFFER: usize = 128;
@@ -43,17 +45,21 @@ pub(super) struct Grbl {
     now_us: u64,
     /// At `M0`, until `~`.
     paused: bool,
+    homing: Option<EmulatedHoming>,
+    datum: Datum,
+    /// Work coordinates less those of the machine.
+    offset: [f64; 2],
 }
 
 impl Default for Grbl {
     fn default() -> Self {
-        Self::new()
+        Self::new(&EmulatorOptions::default())
     }
 }
 
 impl Grbl {
-    /// Switched on and homed at 0, 0.
-    pub(super) fn new() -> Self {
+    /// Switched on: homed at 0, 0, or in alarm until it is homed (`$22=1`).
+    pub(super) fn new(options: &EmulatorOptions) -> Self {
         let mut port = Port::new(BUFFER);
         port.answers.push(b"\r\nGrbl 1.1h ['$' for help]\r\n".to_vec());
         Self {
@@ -70,6 +76,12 @@ impl Grbl {
             down: false,
             now_us: 0,
             paused: false,
+            homing: options.homing.filter(|homing| homing.moves_us[0].is_some()),
+            datum: Datum::at_start(
+                options.homing.filter(|homing| homing.moves_us[0].is_some()),
+                options.homed,
+            ),
+            offset: [0.0; 2],
         }
     }
 
@@ -78,7 +90,11 @@ impl Grbl {
     }
 
     fn report(&mut self) {
-        let state = if self.now_us < self.port.stalled_us || self.paused {
+        let state = if matches!(self.datum, Datum::Homing { .. }) {
+            "Home"
+        } else if self.datum != Datum::Known {
+            "Alarm"
+        } else if self.now_us < self.port.stalled_us || self.paused {
             "Hold:0"
         } else if self.blocks.is_empty() && self.now_us >= self.dwell_us {
             "Idle"
@@ -86,7 +102,13 @@ impl Grbl {
             "Run"
         };
         let [x, y] = self.place.map(|mm| (mm * STEPS_PER_MM).round() / STEPS_PER_MM);
-        let report = format!("<{state}|MPos:{x:.3},{y:.3},0.000|FS:0,0>");
+        let [wx, wy] = self.offset;
+        let report = if self.offset == [0.0; 2] {
+            format!("<{state}|MPos:{x:.3},{y:.3},0.000|FS:0,0>")
+        } else {
+            // The machine's own zero is where it was homed.
+            format!("<{state}|MPos:{:.3},{:.3},0.000|FS:0,0|WCO:{:.3},{:.3},0.000>", x - wx, y - wy, -wx, -wy)
+        };
         self.answer(&report);
     }
 
@@ -100,6 +122,16 @@ impl Grbl {
             }
             let Some(next_us) = self.wake_us().filter(|next_us| *next_us <= now_us) else { break };
             self.now_us = next_us;
+            if self.datum.advance(next_us) {
+                match self.datum {
+                    Datum::Failed(SwitchFault::Stuck(_)) => self.answer("ALARM:8"),
+                    Datum::Failed(SwitchFault::Broken(_)) => self.answer("ALARM:9"),
+                    _ => {
+                        (self.place, self.planned) = ([0.0; 2], [0.0; 2]);
+                        self.answer("ok");
+                    }
+                }
+            }
             if self.until_us == Some(next_us) {
                 self.until_us = None;
                 for point in self.blocks.pop_front().map_or_else(Vec::new, |block| block.points) {
@@ -114,6 +146,7 @@ impl Grbl {
     /// Takes one line out of the buffer if possible; whether it did.
     fn take(&mut self) -> bool {
         if self.paused
+            || matches!(self.datum, Datum::Homing { .. })
             || self.now_us < self.dwell_us
             || self.now_us < self.port.stalled_us
             || self.blocks.len() >= BLOCKS
@@ -131,6 +164,33 @@ impl Grbl {
         if line.split([' ', ';']).next() == Some("M0") {
             // It is acknowledged on cycle start.
             self.paused = true;
+            return true;
+        }
+        if line == "$H" {
+            let now_us = self.now_us;
+            if !self.datum.begin(self.homing, now_us) {
+                self.answer("error:5");
+            }
+            return true;
+        }
+        if self.datum != Datum::Known {
+            // Locked: `$X` unlocks it without a datum.
+            let unlocks = line == "$X";
+            if unlocks {
+                self.datum = Datum::Known;
+            }
+            self.answer(if unlocks { "ok" } else { "error:9" });
+            return true;
+        }
+        if let Some(words) = line.strip_prefix("G10 L20 P1 ") {
+            let word = |axis: char| {
+                let found = words.split(' ').find_map(|word| word.strip_prefix(axis));
+                found.and_then(|value| value.parse::<f64>().ok()).unwrap_or(0.0)
+            };
+            // The ink is in work coordinates.
+            (self.place, self.planned) = ([word('X'), word('Y')], [word('X'), word('Y')]);
+            self.offset = self.place;
+            self.answer("ok");
             return true;
         }
         let answer = match self.follow(&line) {
@@ -270,7 +330,20 @@ impl Device for Grbl {
 
     fn wake_us(&self) -> Option<u64> {
         let later = |us: u64| (us > self.now_us).then_some(us);
-        self.until_us.into_iter().chain(later(self.dwell_us)).chain(later(self.port.stalled_us)).min()
+        let timers = later(self.dwell_us).into_iter().chain(later(self.port.stalled_us));
+        self.until_us.into_iter().chain(timers).chain(self.datum.wake_us()).min()
+    }
+
+    fn limit(&mut self, _now_us: u64) {
+        if matches!(self.datum, Datum::Homing { .. }) {
+            return;
+        }
+        // A hard limit: everything stops.
+        self.datum = Datum::Limit;
+        self.blocks.clear();
+        self.until_us = None;
+        self.planned = self.place;
+        self.answer("ALARM:1");
     }
 
     fn pen_is_down(&self) -> bool {

@@ -223,7 +223,7 @@ fn same(here: Option<Point>, to: Point) -> bool {
     here.is_some_and(|here| xy(here) == xy(to))
 }
 
-fn xy(p: Point) -> String {
+pub(super) fn xy(p: Point) -> String {
     format!("X{} Y{}", decimal(p.x, 3), decimal(p.y, 3))
 }
 

@@ -3,16 +3,20 @@
 
 mod emulator;
 mod encode;
+mod homing;
 mod program;
 mod status;
 mod summary;
 
 use std::io::Write;
 
+use kinematics::Machine;
+
 use crate::backend::{
     Backend, EmulatorOptions, EncodeOptions, InkFrame, PenActuator, PenNumbers, PlanSource, SessionOptions,
 };
 use crate::device::Device;
+use crate::homing::HomingSteps;
 use crate::program::{Program, ProgramError};
 use crate::session::Session;
 use crate::status::StatusProtocol;
@@ -115,7 +119,9 @@ impl Backend for Paths {
         let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
         let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, plan.rows(), machine.pen().max_speed_mm_s);
         let park = machine.mechanism().forward(&machine.start());
-        encode::write(&encode::paths(drawing, &speeds_mm_s, park, &options), out)
+        let mut lines = homing::lines(self.0, machine);
+        lines.extend(encode::paths(drawing, &speeds_mm_s, park, &options));
+        encode::write(&lines, out)
     }
 
     fn program(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Result<Program, ProgramError> {
@@ -137,8 +143,16 @@ impl Backend for Paths {
         Some(Box::new(status::GrblStatus::default()))
     }
 
-    fn emulator(&self, _options: &EmulatorOptions) -> Option<Box<dyn Device>> {
-        (self.0 == Flavour::Grbl).then(|| Box::new(emulator::Grbl::new()) as Box<dyn Device>)
+    fn homing(&self, machine: &Machine) -> Option<HomingSteps> {
+        homing::steps(machine)
+    }
+
+    fn knows_datum(&self) -> bool {
+        true
+    }
+
+    fn emulator(&self, options: &EmulatorOptions) -> Option<Box<dyn Device>> {
+        (self.0 == Flavour::Grbl).then(|| Box::new(emulator::Grbl::new(options)) as Box<dyn Device>)
     }
 
     fn ink_frame(&self) -> InkFrame {
@@ -174,7 +188,8 @@ impl Backend for Timed {
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
         let options = options(Flavour::Grbl, self.name(), plan, *encode)?;
-        let lines: Vec<Line> = encode::timed(plan.setpoints(self.name())?, &options, true);
+        let mut lines: Vec<Line> = homing::lines(Flavour::Grbl, plan.machine(self.name())?);
+        lines.extend(encode::timed(plan.setpoints(self.name())?, &options, true));
         encode::write(&lines, out)
     }
 }

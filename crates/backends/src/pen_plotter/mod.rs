@@ -51,6 +51,10 @@ impl Backend for HpGlPlotter {
         "stroke"
     }
 
+    fn homes_itself(&self) -> bool {
+        true
+    }
+
     fn pens(&self) -> PenNumbers {
         PenNumbers::Sent
     }

@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use super::framing::{framed, unframed};
 use crate::backend::EmulatorOptions;
 use crate::device::{Device, Port};
+use crate::homing::{Datum, EmulatedHoming};
 
 /// Its receive buffer unless another size is asked for, bytes.
 const BUFFER: usize = 512;
@@ -37,12 +38,17 @@ pub(super) struct TickLineReader {
     clock_us: u64,
     pen: u16,
     now_us: u64,
+    homing: Option<EmulatedHoming>,
+    datum: Datum,
+    /// Its start pose.
+    home: Option<[i64; 2]>,
 }
 
 impl TickLineReader {
     /// Homed at the start position, if there is one.
     pub(super) fn new(options: &EmulatorOptions) -> Self {
-        let position = options.start;
+        let datum = Datum::at_start(options.homing, options.homed);
+        let position = options.start.filter(|_| datum == Datum::Known);
         let buffer = options.buffer.unwrap_or(BUFFER);
         Self {
             port: Port::new(buffer),
@@ -57,6 +63,9 @@ impl TickLineReader {
             clock_us: 0,
             pen: 0,
             now_us: 0,
+            homing: options.homing,
+            datum,
+            home: options.start,
         }
     }
 
@@ -76,6 +85,9 @@ impl TickLineReader {
             while self.take() || self.begin() {}
             let Some(next_us) = self.wake_us().filter(|next_us| *next_us <= now_us) else { break };
             self.now_us = next_us;
+            if self.datum.advance(next_us) && self.datum == Datum::Known {
+                (self.position, self.planned) = (self.home, self.home);
+            }
             if self.until_us == Some(next_us) {
                 self.until_us = None;
                 if let Some(Order::Move { to, .. }) = self.queue.pop_front() {
@@ -123,6 +135,35 @@ impl TickLineReader {
         true
     }
 
+    fn has_switches(&self) -> bool {
+        self.homing.is_some_and(|homing| homing.moves_us[0].is_some())
+    }
+
+    /// The answer to `home`.
+    fn home(&mut self) -> &'static str {
+        if matches!(self.datum, Datum::Homing { .. }) {
+            return "error homing";
+        }
+        if !self.queue.is_empty() {
+            return "error moving";
+        }
+        let now_us = self.now_us;
+        if !self.datum.begin(self.homing, now_us) {
+            return "error no switches";
+        }
+        (self.position, self.planned, self.next) = (None, None, 0);
+        "ok"
+    }
+
+    /// Stops: the motors are somewhere.
+    fn lose(&mut self, datum: Datum) {
+        self.datum = datum;
+        self.queue.clear();
+        self.until_us = None;
+        self.set_pen(0);
+        (self.position, self.planned) = (None, None);
+    }
+
     fn plain(&mut self, line: &str) {
         let line = line.split(';').next().unwrap_or_default().trim();
         if line.is_empty() {
@@ -135,6 +176,27 @@ impl TickLineReader {
     }
 
     fn numbered(&mut self, text: &str) {
+        if text == "home" {
+            let answer = self.home();
+            self.answer(&framed(answer));
+            return;
+        }
+        if text == "stop" {
+            self.lose(Datum::Unknown);
+            self.answer(&framed("ok"));
+            return;
+        }
+        if text == "status" {
+            let state = match self.datum {
+                Datum::Homing { .. } => "homing",
+                Datum::Failed(_) => "home",
+                Datum::Limit => "limit",
+                _ if self.queue.is_empty() => "idle",
+                _ => "moving",
+            };
+            self.answer(&framed(&format!("status {state} late 0 start power")));
+            return;
+        }
         if text == "where" {
             let moving = u8::from(!self.queue.is_empty());
             let at = self.position.map(|[a, b]| format!("at {a} {b} {moving}"));
@@ -168,6 +230,14 @@ impl TickLineReader {
         let verb = words.next().unwrap_or_default();
         let numbers: Option<Vec<i64>> = words.map(|word| word.parse().ok()).collect();
         let numbers = numbers.ok_or("not a whole number")?;
+        match (self.datum, verb) {
+            (Datum::Limit, "begin") if self.queue.is_empty() => return Err("home"),
+            (Datum::Limit, _) => return Err("limit"),
+            (Datum::Homing { .. }, _) => return Err("homing"),
+            // A reader without switches takes the place of the first sync line for its own.
+            (Datum::Unknown | Datum::Failed(_), _) if self.has_switches() => return Err("home"),
+            _ => {}
+        }
         match (verb, &numbers[..]) {
             ("begin", [1, _, _]) => {
                 (self.moves, self.clock_us) = (0, 0);
@@ -219,7 +289,14 @@ impl Device for TickLineReader {
 
     fn wake_us(&self) -> Option<u64> {
         let stalled = (self.port.stalled_us > self.now_us).then_some(self.port.stalled_us);
-        self.until_us.into_iter().chain(stalled).min()
+        self.until_us.into_iter().chain(stalled).chain(self.datum.wake_us()).min()
+    }
+
+    fn limit(&mut self, _now_us: u64) {
+        // Homing runs into its switches on purpose.
+        if !matches!(self.datum, Datum::Homing { .. }) {
+            self.lose(Datum::Limit);
+        }
     }
 
     fn pen_is_down(&self) -> bool {

@@ -13,6 +13,7 @@
 //! | `at T1 T2 MOVING*SUM` | motor positions, and whether motion is queued (1) or not (0) |
 //! | `at unknown*SUM` | the machine was homed and has received nothing since |
 
+use crate::homing::{HomingStep, HomingSteps, StepAnswer};
 use crate::status::{Answer, StatusProtocol};
 use crate::transmission::sliding_window::{Framing, Reply};
 
@@ -105,6 +106,52 @@ impl StatusProtocol for TickLineStatus {
 
     fn describe(&self, [a, b]: [i64; 2]) -> String {
         format!("{a}, {b} ticks")
+    }
+}
+
+/// Homing by `home`, then `where` and `status` until the position is known.
+pub(crate) fn homing() -> HomingSteps {
+    HomingSteps {
+        steps: vec![
+            HomingStep { text: framed("home") + "\n", repeats: true, parse: begun },
+            HomingStep {
+                text: framed("where") + "\n" + &framed("status") + "\n",
+                repeats: true,
+                parse: found,
+            },
+        ],
+        abort: b"stop*115\n",
+    }
+}
+
+/// Whether homing has begun.
+fn begun(line: &str) -> StepAnswer {
+    match unframed(line).unwrap_or(line) {
+        // The answer to the first `home` was lost.
+        "ok" | "error homing" => StepAnswer::Done,
+        text => match text.strip_prefix("error ") {
+            Some("no switches") => StepAnswer::Failed("the firmware has no switches to home by".to_owned()),
+            Some(why) => StepAnswer::Failed(format!("the machine does not home: {why}")),
+            None => StepAnswer::Other,
+        },
+    }
+}
+
+/// Whether homing has ended.
+fn found(line: &str) -> StepAnswer {
+    let Some(text) = unframed(line) else { return StepAnswer::Other };
+    let words: Vec<&str> = text.split(' ').collect();
+    match words[..] {
+        ["at", "unknown"] => StepAnswer::Other,
+        ["at", _, _, "0"] => StepAnswer::Done,
+        ["status", "home", ..] => StepAnswer::Failed(
+            "homing has failed: a switch did not close on the way to it, or did not open on the way back"
+                .to_owned(),
+        ),
+        ["status", fault @ ("limit" | "stop" | "follow"), ..] => {
+            StepAnswer::Failed(format!("homing was stopped: {fault}"))
+        }
+        _ => StepAnswer::Other,
     }
 }
 

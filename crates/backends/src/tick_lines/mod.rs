@@ -6,11 +6,13 @@ mod framing;
 use std::io::Write;
 use std::sync::Arc;
 
+use kinematics::Machine;
 use plan::TickTable;
 use plan::file::tick_lines;
 
 use crate::backend::{Backend, EmulatorOptions, EncodeOptions, PenNumbers, PlanSource, SessionOptions};
 use crate::device::Device;
+use crate::homing::HomingSteps;
 use crate::program::{Program, ProgramError, RowEncoder};
 use crate::session::Session;
 use crate::status::StatusProtocol;
@@ -86,6 +88,15 @@ impl Backend for Answered {
 
     fn status(&self) -> Option<Box<dyn StatusProtocol>> {
         Some(Box::new(framing::TickLineStatus))
+    }
+
+    fn homing(&self, machine: &Machine) -> Option<HomingSteps> {
+        let moves = machine.parts().homing.as_ref()?.moves();
+        (!moves.is_empty()).then(framing::homing)
+    }
+
+    fn knows_datum(&self) -> bool {
+        true
     }
 
     fn emulator(&self, options: &EmulatorOptions) -> Option<Box<dyn Device>> {

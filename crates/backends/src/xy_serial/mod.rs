@@ -72,6 +72,10 @@ impl Backend for XySerial {
         true
     }
 
+    fn homes_itself(&self) -> bool {
+        true
+    }
+
     fn write(
         &self,
         plan: &PlanSource<'_>,

@@ -110,6 +110,7 @@ pub fn machine() -> Machine {
         },
         pen_servo: None,
         pen_offsets_mm: std::collections::BTreeMap::new(),
+        homing: None,
         sheet: Rect::new(0.0, 0.0, 250.0, 250.0),
         start: JointPos::from([76.0, 60.0]),
         period_s: 0.01,

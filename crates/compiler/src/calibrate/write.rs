@@ -45,6 +45,9 @@ pub fn calibrated(toml: &str, machine: &Machine, before: &Setup, after: &Setup) 
         }
     }
     start(&mut document, machine, after)?;
+    if let Some(homing) = document.get_mut("homing").and_then(Item::as_table_like_mut) {
+        set(homing, "calibrated", true.into());
+    }
     Ok(document.to_string())
 }
 

@@ -6,6 +6,7 @@
 mod drive;
 mod edit;
 mod error;
+mod homing;
 mod line;
 mod servo;
 
@@ -21,6 +22,7 @@ use simulation::Drive;
 pub use self::drive::DriveTable;
 pub use self::edit::{drive_keys, with_drive};
 pub use self::error::{MachineFileError, SyntaxError};
+use self::homing::HomingTable;
 use self::servo::ServoTable;
 use crate::quantity::{self, Dimension, QuantityError};
 
@@ -108,6 +110,8 @@ pub struct MachineFile {
     pen: PenTable,
     sheet: SheetTable,
     start: PerJoint<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    homing: Option<HomingTable>,
     #[serde(default)]
     plan: PlanTable,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -262,6 +266,9 @@ impl MachineFile {
             };
         }
         let start = self.start(&*mechanism)?;
+        let motors = self.motor.as_slice();
+        let homing =
+            self.homing.as_ref().map(|homing| homing.homing(&*mechanism, motors, &joints)).transpose()?;
         let [first, second] = self.motor.as_slice() else {
             return Err(MachineFileError::Invalid(format!(
                 "a machine has two motors, this file has {}",
@@ -292,6 +299,7 @@ impl MachineFile {
             },
             pen_servo: self.pen.servo.as_ref().map(ServoTable::servo).transpose()?,
             pen_offsets_mm: self.pen_offsets()?,
+            homing,
             sheet: Rect { x0: x, y0: y, x1: x + width, y1: y + height },
             start,
             period_s: time(&self.plan.period, "plan.period")?,

@@ -94,6 +94,12 @@ pub(crate) struct Send {
     /// The machine, where the plan only knows its name and it is no preset
     #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
+    /// Home first, as [homing] of the machine file states
+    #[arg(long, conflicts_with = "assume_homed")]
+    pub(crate) home: bool,
+    /// Take the machine's start pose for granted, though it has [homing] and does not know where it is
+    #[arg(long)]
+    pub(crate) assume_homed: bool,
     /// For ebb: SM moves, which every firmware version executes
     #[arg(long)]
     pub(crate) stepper_moves: bool,
@@ -169,7 +175,7 @@ pub(crate) struct Emulate {
     /// For ticks and ebb: the machine, for the motors' start and the picture
     #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
-    /// Fault to inject: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N, held=AT:TIME, power-cut=AT
+    /// Fault to inject: lost-answer=N, late-answer=N:TIME, garbled-answer=N, full-buffer=AT:TIME, unplugged=AT:TIME, garbled-byte=N, held=AT:TIME, power-cut=AT, limit=AT, switch-broken=N, switch-stuck=N
     #[arg(long, value_name = "FAULT", value_parser = fault)]
     pub(crate) fault: Vec<backends::Fault>,
     /// Run this many times faster than real time
@@ -184,7 +190,7 @@ pub(crate) struct Emulate {
     /// For ticks: announce the room in the receive buffer in the answer to line 0
     #[arg(long)]
     pub(crate) announce_room: bool,
-    /// For xy-serial: homed before
+    /// Homed before: xy-serial, and machines with [homing]
     #[arg(long)]
     pub(crate) homed: bool,
 }

@@ -143,6 +143,7 @@ pub(super) fn positions(text: &str) -> Result<(f64, f64), String> {
 #[cfg(unix)]
 pub(super) fn fault(text: &str) -> Result<backends::Fault, String> {
     use backends::Fault;
+    use backends::homing::SwitchFault;
     let what = "a fault is KIND=N or KIND=N:TIME, such as lost-answer=5 or unplugged=2s:1s";
     let (kind, value) = text.split_once('=').ok_or(what)?;
     let (first, second) = value.split_once(':').map_or((value, None), |(a, b)| (a, Some(b)));
@@ -158,6 +159,9 @@ pub(super) fn fault(text: &str) -> Result<backends::Fault, String> {
         "unplugged" => Fault::Unplugged(microseconds(first)?, lasting()?),
         "held" => Fault::Held(microseconds(first)?, lasting()?),
         "power-cut" => Fault::PowerCut(microseconds(first)?),
+        "limit" => Fault::Limit(microseconds(first)?),
+        "switch-broken" => Fault::Switch(SwitchFault::Broken(number(first)?.min(1) as u8)),
+        "switch-stuck" => Fault::Switch(SwitchFault::Stuck(number(first)?.min(1) as u8)),
         _ => return Err(what.to_owned()),
     })
 }

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use backends::{Device, EmulatorOptions, FaultInjector, InkFrame};
+use backends::homing::EmulatedHoming;
+use backends::{Device, EmulatorOptions, Fault, FaultInjector, InkFrame};
 use compiler::report::Code;
 use drawing::{Point, Rect};
 use kinematics::MotorPos;
@@ -52,6 +53,13 @@ fn device(arguments: &Emulate, machine: Option<&LoadedMachine>) -> Result<Box<dy
     let options = EmulatorOptions {
         start: machine.map(start_ticks),
         homed: arguments.homed,
+        homing: machine.and_then(|machine| machine.machine.parts().homing.as_ref()).map(|homing| {
+            let switch = arguments.fault.iter().find_map(|fault| match fault {
+                Fault::Switch(switch) => Some(*switch),
+                _ => None,
+            });
+            EmulatedHoming::of(homing, switch)
+        }),
         answers_within_mm: 0.0,
         buffer: arguments.buffer,
         announces_room: arguments.announce_room,

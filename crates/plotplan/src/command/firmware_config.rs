@@ -20,6 +20,8 @@ const LONGEST_NAME: usize = 24;
 const MOST_STEPS_S: f64 = 20_000.0;
 /// Counts per second of an encoder with both motors and the loop running.
 const MOST_COUNTS_S: f64 = 20_000.0;
+/// Largest ticks of a motor in a unit of a homing move.
+const MOST_TICKS_PER_UNIT: u32 = 127;
 /// Largest ticks: the loop holds 1/64 tick in 32 bits.
 const MOST_TICKS: f64 = 16_777_215.0;
 /// Margin of the largest speed, for rounding to microseconds.
@@ -92,11 +94,65 @@ pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Re
     }
     let [up, down] = pen_pulses(machine);
     let _ = write!(text, "    }},\n    /* .pen: kind, up, down (us) */ {{PEN_SERVO, {up}, {down}}},\n    ");
-    text.push_str(
-        "/* .homing */ {{false, 0, {0, 0}, 0, 0, 0, 0}, {false, 0, {0, 0}, 0, 0, 0, 0}},\n    \
-         /* .home */ {0, 0}, /* .must_home */ false,\n    /* .limits_used, .stop_used */ false, false,\n};\n",
+    let moves = homing(machine)?;
+    let used = machine.parts().homing.as_ref().is_some_and(|homing| !homing.moves().is_empty());
+    let home = if used { machine.motor_positions(&machine.start()).0.map(f64::round) } else { [0.0; 2] };
+    let _ = write!(
+        text,
+        "/* .homing */ {{{}, {}}},\n    /* .home */ {{{}, {}}}, /* .must_home */ {used},\n    \
+         /* .limits_used, .stop_used */ {used}, false,\n}};\n",
+        moves[0], moves[1], home[0], home[1]
     );
     Ok(text)
+}
+
+/// Homing moves as the firmware has them: used, switch, ticks of each motor per unit in the direction of the
+/// switch, us per unit fast and slow, units to back off, units after which it fails.
+fn homing(machine: &Machine) -> Result<[String; 2], Failure> {
+    let mut texts = ["{false, 0, {0, 0}, 0, 0, 0, 0}", "{false, 0, {0, 0}, 0, 0, 0, 0}"].map(str::to_owned);
+    let Some(homing) = &machine.parts().homing else { return Ok(texts) };
+    let mut switches: Vec<&str> = Vec::new();
+    for (text, mv) in texts.iter_mut().zip(homing.moves()) {
+        let Some(switch) = mv.switch.as_deref() else {
+            return Err(Failure::Usage(anyhow!("the firmware homes by switches, not by a mechanical stop")));
+        };
+        if !switches.contains(&switch) {
+            switches.push(switch);
+        }
+        let number = switches.iter().position(|other| *other == switch).unwrap_or(0);
+        let ticks = mv.ticks_per_unit(machine);
+        let most = ticks[0].abs().max(ticks[1].abs());
+        let travel_ticks = mv.timeout_s * mv.speed.abs() * most;
+        // Whole ticks in the ratio of the motors, few enough for the firmware's bytes, so many that the
+        // longest way is not more than its counter holds.
+        let fewest = (travel_ticks / f64::from(u16::MAX)).ceil().max(1.0) as u32;
+        let error = |n: u32| {
+            let off = |ticks: f64| {
+                let wanted = ticks / most * f64::from(n);
+                (wanted - wanted.round()).abs() / f64::from(n)
+            };
+            off(ticks[0]).max(off(ticks[1]))
+        };
+        let units = (fewest..=MOST_TICKS_PER_UNIT).find(|n| error(*n) < 0.002);
+        let units =
+            units.or_else(|| (fewest..=MOST_TICKS_PER_UNIT).min_by(|a, b| error(*a).total_cmp(&error(*b))));
+        let Some(n) = units else {
+            return Err(Failure::Usage(anyhow!(
+                "the way to switch {switch} is too long for the firmware's counter"
+            )));
+        };
+        let unit = f64::from(n) / most;
+        let [a, b] = ticks.map(|ticks| (ticks / most * f64::from(n) * mv.speed.signum()).round());
+        let us = |speed: f64| (unit / speed * 1e6).round().clamp(1.0, f64::from(u16::MAX));
+        *text = format!(
+            "{{true, {number}, {{{a}, {b}}}, {}, {}, {}, {}}}",
+            us(mv.speed.abs()),
+            us(mv.slow_speed),
+            (mv.back_off / unit).ceil(),
+            (travel_ticks / most / unit).ceil()
+        );
+    }
+    Ok(texts)
 }
 
 /// Pulses of the pen's servo with the pen up and down, us: those of the machine file, or two to adjust.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use compiler::report::{Code, MachineReport, MachineSource, WorkspaceReport};
 
-use super::firmware_config;
+use super::{firmware_config, new_machine};
 use crate::cli::Machine;
 use crate::failure::Failure;
 use crate::machines;
@@ -22,6 +22,9 @@ pub(crate) fn run(arguments: &Machine) -> Result<(), Failure> {
             machines::machine(name)?;
             let text = machines::machine_toml(name)?;
             output::write("-", |out| out.write_all(text.as_bytes()))
+        }
+        Machine::New { kind, output, name, set, defaults } => {
+            new_machine::run(kind.as_deref(), output, name.as_deref(), set, *defaults)
         }
         Machine::Check { file, output } => {
             let text = check(file)?;

@@ -10,15 +10,17 @@ use backends::{Backend, Outcome, PlanSource, Program, ProgramError, RowIter, Ses
 use compiler::import;
 use compiler::report::text::pluralize;
 use compiler::report::{Code, SendEnd, SendReport, SendUnit};
+use kinematics::Machine;
 use plan::TickTable;
 use serialport::FlowControl;
 
+use super::homing;
 use crate::cli::{Flow, Send};
 use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::port::Settings;
 use crate::wire::Wire;
-use crate::{output, session, terminal};
+use crate::{machines, output, session, terminal};
 
 pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     let backend = arguments.protocol.0;
@@ -26,7 +28,7 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
         return Err(Failure::Usage(anyhow::anyhow!(what)));
     }
     let input = input::read(&arguments.plan)?;
-    let program = program(arguments, backend, &input)?;
+    let (program, machine) = program(arguments, backend, &input)?;
     if arguments.dry_run {
         return dry_run(arguments, &from_row(arguments, &program, None)?);
     }
@@ -47,6 +49,13 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
         return Err(Failure::Drawing(anyhow::anyhow!(why)));
     }
     let mut wire = Wire::open(settings, arguments.log.as_deref())?;
+    match &machine {
+        Some(machine) => homing::ensure(arguments, backend, machine, &mut wire)?,
+        None if arguments.home => {
+            return Err(Failure::Usage(anyhow::anyhow!("--home: give the machine file with --machine")));
+        }
+        None => {}
+    }
     let program = match (arguments.from, backend.status()) {
         (Some(row), Some(status)) => {
             let position = wire.query_position(status)?;
@@ -131,13 +140,20 @@ fn from_row(arguments: &Send, program: &Program, position: Option<[i64; 2]>) -> 
 }
 
 /// What is sent: the lines of a plan, or those of a file in the machine's own language.
-fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Program, Failure> {
+fn program(
+    arguments: &Send,
+    backend: &dyn Backend,
+    input: &Input,
+) -> Result<(Program, Option<Machine>), Failure> {
     if !plan::file::is_plan(&input.bytes) {
         if backend.name() == "hpgl" {
             refuse_other_drawings(input)?;
         }
         let what = || format!("{} is not a plan; this protocol sends plans (ticks, csv or json)", input.path);
-        return backend.parse_program(&input.bytes).ok_or_else(|| Failure::Drawing(anyhow::anyhow!(what())));
+        let program = backend.parse_program(&input.bytes);
+        let program = program.ok_or_else(|| Failure::Drawing(anyhow::anyhow!(what())))?;
+        let machine = arguments.machine.as_deref().map(machines::machine).transpose()?;
+        return Ok((program, machine.map(|machine| machine.machine)));
     }
     let (table, machine) = if backend.needs_machine() {
         let (plan, machine) = super::verify::plan(input, arguments.machine.as_deref())?;
@@ -160,7 +176,8 @@ fn program(arguments: &Send, backend: &dyn Backend, input: &Input) -> Result<Pro
     let mut encode = arguments.pen.encode_options();
     encode.legacy_moves = arguments.stepper_moves;
     let unfit = |error: ProgramError| Failure::Drawing(error.into());
-    backend.program(&source, &encode).map_err(unfit)
+    let program = backend.program(&source, &encode).map_err(unfit)?;
+    Ok((program, machine))
 }
 
 /// Refuses what a plotter cannot be sent: anything but HP-GL.

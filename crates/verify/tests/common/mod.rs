@@ -45,6 +45,7 @@ fn parts(
         },
         pen_servo: None,
         pen_offsets_mm: std::collections::BTreeMap::new(),
+        homing: None,
         sheet: Rect::new(0.0, 0.0, 200.0, 200.0),
         start,
         period_s: 0.01,
