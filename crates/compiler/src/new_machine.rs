@@ -78,8 +78,8 @@ pub fn questions(kind: &str) -> Option<Vec<Question>> {
     let (own, speeds, sheet) = match kind {
         "cartesian" => (TABLE, ["100mm/s", "1000mm/s2"], "A5,landscape"),
         "two-link" => (ARM, ["60deg/s", "300deg/s2"], "A5,landscape"),
-        "polar" => (RAIL, ["", ""], "A7,landscape"),
-        "five-bar" => (TWO_ARMS, ["60deg/s", "300deg/s2"], "A7,landscape"),
+        "polar" => (RAIL, ["", ""], "100x70mm"),
+        "five-bar" => (TWO_ARMS, ["60deg/s", "300deg/s2"], "100x70mm"),
         "polargraph" => (CORDS, ["50mm/s", "200mm/s2"], "A4"),
         _ => return None,
     };

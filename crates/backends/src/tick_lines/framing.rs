@@ -142,7 +142,6 @@ fn found(line: &str) -> StepAnswer {
     let Some(text) = unframed(line) else { return StepAnswer::Other };
     let words: Vec<&str> = text.split(' ').collect();
     match words[..] {
-        ["at", "unknown"] => StepAnswer::Other,
         ["at", _, _, "0"] => StepAnswer::Done,
         ["status", "home", ..] => StepAnswer::Failed(
             "homing has failed: a switch did not close on the way to it, or did not open on the way back"
