@@ -16,7 +16,7 @@ use clap_complete::Shell;
 
 #[cfg(unix)]
 pub(crate) use device::Emulate;
-pub(crate) use device::{Flow, PenLift, Send};
+pub(crate) use device::{Datum, Flow, PenLift, Send};
 pub(crate) use format::Format;
 pub(crate) use ink::{InkColor, with_ink_color};
 pub(crate) use project::{Build, Diff, Init};

@@ -53,6 +53,17 @@ impl PenLift {
     }
 }
 
+/// How the machine's start pose is found.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct Datum {
+    /// Home first, as [homing] of the machine file states
+    #[arg(long, conflicts_with = "assume_homed")]
+    pub(crate) home: bool,
+    /// Take the machine's start pose for granted, though it has [homing] and does not know where it is
+    #[arg(long)]
+    pub(crate) assume_homed: bool,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct Send {
     /// Plan to send, or for gcode, xy-serial, hpgl and raw a file in the machine's own language; `-` for standard input
@@ -94,12 +105,8 @@ pub(crate) struct Send {
     /// The machine, where the plan only knows its name and it is no preset
     #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
     pub(crate) machine: Option<String>,
-    /// Home first, as [homing] of the machine file states
-    #[arg(long, conflicts_with = "assume_homed")]
-    pub(crate) home: bool,
-    /// Take the machine's start pose for granted, though it has [homing] and does not know where it is
-    #[arg(long)]
-    pub(crate) assume_homed: bool,
+    #[command(flatten)]
+    pub(crate) datum: Datum,
     /// For ebb: SM moves, which every firmware version executes
     #[arg(long)]
     pub(crate) stepper_moves: bool,

@@ -5,34 +5,35 @@ use backends::Backend;
 use backends::homing::HomingRun;
 use kinematics::{HomingMethod, Machine};
 
-use crate::cli::Send;
+use crate::cli::Datum;
 use crate::failure::Failure;
 use crate::terminal;
 use crate::wire::Wire;
 
 /// Makes sure that a machine with `[homing]` knows where it is, or refuses.
 pub(super) fn ensure(
-    arguments: &Send,
+    datum: Datum,
+    resumes: bool,
     backend: &dyn Backend,
     machine: &Machine,
     wire: &mut Wire,
 ) -> Result<(), Failure> {
     let Some(homing) = &machine.parts().homing else {
-        if arguments.home {
+        if datum.home {
             let name = machine.name();
             return Err(Failure::Usage(anyhow!("--home: the machine file of {name} has no [homing]")));
         }
         return Ok(());
     };
-    if arguments.assume_homed {
+    if datum.assume_homed {
         terminal::say("the machine is taken to stand in its start pose\n");
         return Ok(());
     }
-    if backend.homes_itself() || (arguments.from.is_some() && !backend.knows_datum()) {
+    if backend.homes_itself() || (resumes && !backend.knows_datum()) {
         return Ok(());
     }
     let state = if homing.calibrated { "calibrated" } else { "homed" };
-    if arguments.home {
+    if datum.home {
         match &homing.method {
             HomingMethod::Pose(pose) => {
                 terminal::always(&format!("{pose}, then press Enter\n"));

@@ -50,8 +50,10 @@ pub(crate) fn run(arguments: &Send) -> Result<(), Failure> {
     }
     let mut wire = Wire::open(settings, arguments.log.as_deref())?;
     match &machine {
-        Some(machine) => homing::ensure(arguments, backend, machine, &mut wire)?,
-        None if arguments.home => {
+        Some(machine) => {
+            homing::ensure(arguments.datum, arguments.from.is_some(), backend, machine, &mut wire)?;
+        }
+        None if arguments.datum.home => {
             return Err(Failure::Usage(anyhow::anyhow!("--home: give the machine file with --machine")));
         }
         None => {}
