@@ -19,6 +19,36 @@ export function element(tag, attributes = {}, ...children) {
   return made;
 }
 
+/**
+ * Makes a list of tabs work: clicks, and arrow keys. Returns the function that opens a tab by its id.
+ * @param {HTMLElement} list @param {(id: string) => void} opened
+ */
+export function tabs(list, opened) {
+  const all = [...list.querySelectorAll('[role="tab"]')].map((tab) => /** @type {HTMLElement} */ (tab));
+  const open = (/** @type {string} */ id) => {
+    for (const tab of all) {
+      const isOpen = tab.id === id;
+      tab.setAttribute("aria-selected", String(isOpen));
+      tab.setAttribute("tabindex", isOpen ? "0" : "-1");
+      byId(tab.getAttribute("aria-controls") ?? "").hidden = !isOpen;
+    }
+    opened(id);
+  };
+  all.forEach((tab, k) => {
+    tab.addEventListener("click", () => open(tab.id));
+    tab.addEventListener("keydown", (event) => {
+      const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+      if (step === 0) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const next = all[(k + step + all.length) % all.length];
+      open(next.id);
+      next.focus();
+    });
+  });
+  return open;
+}
+
 const SVG = "http://www.w3.org/2000/svg";
 
 /** A filled bar from 0 to `share` of its width. @param {number} share @param {string} color */

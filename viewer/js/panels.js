@@ -29,6 +29,10 @@ function distance(distances) {
  * @param {HTMLElement} panel @param {any} meta @param {import("./plan.js").Track} rows
  */
 export function planPanel(panel, meta, rows) {
+  if (rows.t.length < 2) {
+    panel.replaceChildren(element("p", {}, "There is no plan yet."));
+    return;
+  }
   panel.replaceChildren(
     ...certificate(meta),
     ...prediction(meta),
@@ -112,7 +116,6 @@ function times(meta, rows) {
 function limitedBy(meta) {
   const by = Object.entries(meta.summary?.limited_by_s ?? {}).sort((a, b) => b[1] - a[1]);
   const total = by.reduce((sum, [, seconds]) => sum + seconds, 0);
-  if (total <= 0) return [];
   const shown = by.filter(([, seconds]) => seconds >= 0.01 * total);
   return [
     element("h2", {}, "What limits drawing"),

@@ -24,8 +24,9 @@ export class Picture {
   /**
    * @param {{base: HTMLCanvasElement, ink: HTMLCanvasElement, front: HTMLCanvasElement}} canvases
    * @param {any} meta @param {Track} rows @param {Track | null} predicted
+   * @param {Picture | null} before  the picture in whose place this one comes: its view stays
    */
-  constructor(canvases, meta, rows, predicted) {
+  constructor(canvases, meta, rows, predicted, before) {
     this.canvases = canvases;
     this.meta = meta;
     this.rows = rows;
@@ -53,6 +54,17 @@ export class Picture {
     this.corners = corners(rows);
     this.boxes = boxes(rows);
     this.stale = true;
+    if (before) this.keep(before);
+  }
+
+  /** Takes the view of another picture. @param {Picture} before */
+  keep(before) {
+    Object.assign(this.shows, before.shows);
+    for (const name of /** @type {const} */ (["scale", "x", "y", "width", "height", "ratio", "isFit"])) {
+      Object.assign(this, { [name]: before[name] });
+    }
+    const sheets = [this, before].map((picture) => picture.meta.machine.sheet_mm.join());
+    if (sheets[0] !== sheets[1]) this.fit();
   }
 
   /** The size of the stage changed. @param {number} width @param {number} height */
@@ -143,7 +155,7 @@ export class Picture {
   /**
    * Draws what a frame needs. Ink up to `row` and everything that moves; more ink than fits into a
    * frame follows in the next ones. Returns whether anything is left.
-   * @param {{row: number, motors: [number, number], predictedRow: number, predictedMotors: [number, number] | null, isPlaying: boolean}} now
+   * @param {{row: number, motors: [number, number], predictedRow: number, predictedMotors: [number, number] | null, isPlaying: boolean, tool: import("./viewer.js").Tool | null}} now
    */
   frame(now) {
     if (this.stale) {
@@ -374,7 +386,7 @@ export class Picture {
     }
   }
 
-  /** @param {{row: number, motors: [number, number], predictedMotors: [number, number] | null}} now */
+  /** @param {{row: number, motors: [number, number], predictedMotors: [number, number] | null, tool: import("./viewer.js").Tool | null}} now */
   drawFront(now) {
     const context = this.context(this.canvases.front);
     this.clear(context);
@@ -401,6 +413,7 @@ export class Picture {
     }
     this.drawPen(context, px, py, isDown ? style?.color ?? "#000000" : null);
     this.drawMarks(context);
+    now.tool?.draw(context, this);
   }
 
   /**

@@ -5,18 +5,16 @@ import { time } from "./format.js";
 export class Scrubber {
   /**
    * @param {HTMLElement} box @param {HTMLCanvasElement} bands @param {HTMLElement} head @param {HTMLElement} window
-   * @param {import("./plan.js").Track} rows @param {(pen: number) => string} colorOf
-   * @param {number} end s @param {(t: number) => void} seek
+   * @param {(t: number) => void} seek
    */
-  constructor(box, bands, head, window, rows, colorOf, end, seek) {
+  constructor(box, bands, head, window, seek) {
     this.box = box;
     this.bands = bands;
     this.head = head;
     this.window = window;
-    this.rows = rows;
-    this.colorOf = colorOf;
-    this.end = end || 1;
-    box.setAttribute("aria-valuemax", this.end.toFixed(2));
+    /** @type {import("./plan.js").Track | null} */
+    this.rows = null;
+    this.end = 1;
     const at = (/** @type {PointerEvent} */ event) => {
       const { left, width } = box.getBoundingClientRect();
       seek(Math.min(Math.max((event.clientX - left) / width, 0), 1) * this.end);
@@ -33,7 +31,21 @@ export class Scrubber {
     new ResizeObserver(() => this.draw()).observe(box);
   }
 
+  /**
+   * Shows the strokes of a plan.
+   * @param {import("./plan.js").Track} rows @param {(pen: number) => string} colorOf @param {number} end s
+   */
+  show(rows, colorOf, end) {
+    this.rows = rows;
+    this.colorOf = colorOf;
+    this.end = end || 1;
+    this.shown = undefined;
+    this.box.setAttribute("aria-valuemax", this.end.toFixed(2));
+    this.draw();
+  }
+
   draw() {
+    if (!this.rows) return;
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const width = Math.max(Math.round(this.box.clientWidth * ratio), 1);
     const height = Math.max(Math.round(this.box.clientHeight * ratio), 1);
@@ -55,7 +67,7 @@ export class Scrubber {
     }
     const bottoms = new Float32Array(width + 1).fill(height);
     for (const [number, share] of [...shares].sort((a, b) => a[0] - b[0])) {
-      context.fillStyle = this.colorOf(number);
+      context.fillStyle = this.colorOf?.(number) ?? "#000000";
       for (let x = 0; x < width; x++) {
         if (share[x] <= 0) continue;
         const size = Math.max(share[x] * (height - 6 * ratio), 2);

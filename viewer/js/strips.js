@@ -84,7 +84,15 @@ export class Strips {
     this.head = 0;
     this.width = 0;
     this.strips = strips.map((strip) => this.make(strip));
-    new ResizeObserver(() => this.resize()).observe(parent);
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(parent);
+  }
+
+  /** Takes the diagrams out of the page. */
+  remove() {
+    this.observer.disconnect();
+    for (const made of this.strips) made.chart?.destroy();
+    this.parent.replaceChildren();
   }
 
   /** @param {Strip} strip */

@@ -2,7 +2,7 @@
 
 import { unpack } from "./columns.js";
 import { KINDS, LEVELS, SCALE, viridis } from "./colors.js";
-import { byId, element, ramp, swatch } from "./dom.js";
+import { byId, element, ramp, swatch, tabs } from "./dom.js";
 import { plural, short, time, whole } from "./format.js";
 import { pen as penOf } from "./machine.js";
 import { messagesPanel, planPanel, strokePanel } from "./panels.js";
@@ -17,9 +17,69 @@ const RATES = [0.25, 0.5, 1, 2, 5, 10, 25, 50, 100];
 /** Paths of the play button's shape. */
 const SHAPES = { play: "M4 2v12l10-6z", pause: "M3 2h4v12H3zM9 2h4v12H9z" };
 
+/**
+ * What takes the pointer on the picture, machine mm: the studio places and sketches with it.
+ * @typedef {object} Tool
+ * @property {(at: [number, number], event: PointerEvent) => boolean} down  whether it takes this drag
+ * @property {(at: [number, number], event: PointerEvent) => void} move
+ * @property {(at: [number, number], event: PointerEvent) => void} up
+ * @property {() => void} cancel
+ * @property {(at: [number, number], front: HTMLElement) => void} hover
+ * @property {(key: string, isShifted: boolean) => boolean} key  whether it takes the key on the picture
+ * @property {(context: CanvasRenderingContext2D, picture: Picture) => void} draw  over all else
+ */
+
 export class Viewer {
   /** @param {any} meta @param {Uint8Array} bytes the columns, inflated */
   constructor(meta, bytes) {
+    this.t = 0;
+    this.row = 0;
+    this.rate = 1;
+    this.end = 0;
+    this.isPlaying = false;
+    this.selected = -1;
+    /** @type {Tool | null} What takes the pointer on the picture instead of moving it. */
+    this.tool = null;
+    /** @type {import("./plan.js").Limit[] | null} */
+    this.limits = null;
+    /** @type {any} */
+    this.meta = meta;
+    /** @type {import("./plan.js").Track} */
+    this.rows;
+    /** @type {import("./plan.js").Track | null} */
+    this.predicted;
+    /** @type {Float64Array | null} */
+    this.deviation;
+    /** @type {import("./plan.js").Motion | null} */
+    this.motion;
+    /** @type {Strips | null} */
+    this.strips;
+    /** @type {Source} */
+    this.source;
+    /** @type {Picture} */
+    this.picture;
+    const canvas = (/** @type {string} */ id) => /** @type {HTMLCanvasElement} */ (byId(id));
+    this.stage = byId("stage");
+    this.front = canvas("front");
+    this.canvases = { base: canvas("base"), ink: canvas("ink"), front: this.front };
+    this.scrubber = new Scrubber(byId("scrubber"), canvas("bands"), byId("head"), byId("window"), (t) => this.seek(t));
+    this.openTab = tabs(byId("tab-plan").parentElement ?? document.body, () => this.source.reveal());
+    this.show(meta, bytes, false);
+    this.listen();
+    new ResizeObserver(() => {
+      this.picture.resize(this.stage.clientWidth, this.stage.clientHeight);
+      this.draw();
+    }).observe(this.stage);
+    this.fromHash();
+    this.draw();
+  }
+
+  /**
+   * Shows a plan, in place of the one before: time, view and colours stay. A draft has no diagrams.
+   * @param {any} meta @param {Uint8Array} bytes the columns, inflated @param {boolean} isDraft
+   */
+  show(meta, bytes, isDraft) {
+    const wasAtEnd = this.end > 0 && this.t >= this.end;
     this.meta = meta;
     const { numbers, texts } = unpack(bytes, meta.columns);
     const column = (/** @type {string} */ name) => numbers.get(name) ?? new Float64Array(0);
@@ -33,33 +93,31 @@ export class Viewer {
     this.deviation = numbers.get("deviation") ?? null;
     this.end = this.rows.t[this.rows.t.length - 1];
     if (this.predicted) this.end = Math.max(this.end, this.predicted.t[this.predicted.t.length - 1]);
+    this.t = wasAtEnd ? this.end : Math.min(this.t, this.end);
     this.source = new Source(meta, numbers, texts);
-    this.t = 0;
-    this.row = 0;
-    this.rate = 1;
-    this.isPlaying = false;
-    this.selected = -1;
-    /** @type {import("./plan.js").Limit[] | null} */
+    this.motion = null;
     this.limits = null;
-    const canvas = (/** @type {string} */ id) => /** @type {HTMLCanvasElement} */ (byId(id));
-    this.stage = byId("stage");
-    this.front = canvas("front");
-    this.picture = new Picture({ base: canvas("base"), ink: canvas("ink"), front: this.front }, meta, this.rows, this.predicted);
-    this.scrubber = new Scrubber(byId("scrubber"), canvas("bands"), byId("head"), byId("window"), this.rows,
-      (number) => this.picture.pens.get(number)?.color ?? "#000000", this.end, (t) => this.seek(t));
+    this.selected = -1;
+    this.picture = new Picture(this.canvases, meta, this.rows, this.predicted, this.picture ?? null);
+    this.scrubber.show(this.rows, (number) => this.picture.pens.get(number)?.color ?? "#000000", this.end);
+    if (!isDraft) {
+      this.strips?.remove();
+      this.strips = null;
+      // The picture first: speeds and strips follow when it is on the screen.
+      const { rows } = this;
+      requestAnimationFrame(() => setTimeout(() => rows === this.rows && this.addMotion(), 0));
+    }
     this.showTexts();
-    this.listen();
-    new ResizeObserver(() => {
-      this.picture.resize(this.stage.clientWidth, this.stage.clientHeight);
-      this.draw();
-    }).observe(this.stage);
-    // The picture first: speeds and strips follow when it is on the screen.
-    requestAnimationFrame(() => setTimeout(() => this.addMotion(), 0));
-    this.fromHash();
     this.draw();
   }
 
   addMotion() {
+    // A machine that stands has no motion.
+    if (this.rows.t.length > 1) this.showMotion();
+    document.documentElement.dataset.ready = "true";
+  }
+
+  showMotion() {
     this.motion = motion(this.meta, this.rows);
     this.limits = limits(this.meta, this.rows, this.motion);
     this.strips = new Strips(byId("strips"), this.rows.t, stripsOf(this.meta, this.rows, this.motion), {
@@ -70,7 +128,6 @@ export class Viewer {
     this.strips.setHead(this.t, false);
     if (this.colorBy !== "pen") this.setColor(this.colorBy ?? "pen");
     if (this.selected >= 0) this.select(this.selected, this.selectedRow ?? 0);
-    document.documentElement.dataset.ready = "true";
   }
 
   /** The limit that binds at a row: its index from 1, or 0. @param {number} row */
@@ -81,19 +138,22 @@ export class Viewer {
   showTexts() {
     const { meta } = this;
     byId("title").textContent = meta.title;
-    byId("subtitle").textContent = `${meta.subtitle}, ${time(this.end)}, ${plural(this.rows.first.length, "stroke")}`;
+    const drawn = this.end > 0 ? `, ${time(this.end)}, ${plural(this.rows.first.length, "stroke")}` : "";
+    byId("subtitle").textContent = `${meta.subtitle}${drawn}`;
     const verdict = byId("verdict");
     const holds = meta.certificate?.holds;
     verdict.hidden = holds === undefined;
+    verdict.classList.remove("good", "bad");
     verdict.textContent = holds ? (meta.certificate.after_rounding ? "Certificate holds" : "Motion holds") : "Certificate does not hold";
     verdict.classList.add(holds ? "good" : "bad");
     planPanel(byId("panel-plan"), meta, this.rows);
     strokePanel(byId("panel-stroke"), this, -1, 0);
     messagesPanel(byId("panel-messages"), this);
     const count = meta.diagnostics.length;
-    if (count > 0) byId("tab-messages").textContent = `Messages (${count})`;
-    const select = /** @type {HTMLSelectElement} */ (byId("color"));
-    if (!this.deviation) select.querySelector('[value="deviation"]')?.remove();
+    byId("tab-messages").textContent = count > 0 ? `Messages (${count})` : "Messages";
+    const byDeviation = /** @type {HTMLOptionElement} */ (byId("color").querySelector('[value="deviation"]'));
+    byDeviation.hidden = !this.deviation;
+    byDeviation.disabled = !this.deviation;
     byId("predicted-field").hidden = !this.predicted;
     this.front.setAttribute("aria-label", `${meta.title}, ${meta.subtitle}: picture of the machine and the ink. Arrow keys move it, plus and minus zoom, F fits.`);
   }
@@ -125,7 +185,6 @@ export class Viewer {
       const menu = /** @type {HTMLDetailsElement} */ (byId("layers"));
       if (menu.open && !menu.contains(/** @type {Node} */ (event.target))) menu.open = false;
     });
-    this.listenToTabs();
     this.listenToPicture();
     document.addEventListener("keydown", (event) => this.key(event));
     window.addEventListener("hashchange", () => this.fromHash());
@@ -137,38 +196,12 @@ export class Viewer {
     });
   }
 
-  listenToTabs() {
-    const tabs = [...document.querySelectorAll('[role="tab"]')].map((tab) => /** @type {HTMLElement} */ (tab));
-    tabs.forEach((tab, k) => {
-      tab.addEventListener("click", () => this.openTab(tab.id));
-      tab.addEventListener("keydown", (event) => {
-        const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
-        if (step === 0) return;
-        event.preventDefault();
-        event.stopPropagation();
-        const next = tabs[(k + step + tabs.length) % tabs.length];
-        this.openTab(next.id);
-        next.focus();
-      });
-    });
-  }
-
-  /** @param {string} id */
-  openTab(id) {
-    for (const tab of document.querySelectorAll('[role="tab"]')) {
-      const isOpen = tab.id === id;
-      tab.setAttribute("aria-selected", String(isOpen));
-      tab.setAttribute("tabindex", isOpen ? "0" : "-1");
-      byId(tab.getAttribute("aria-controls") ?? "").hidden = !isOpen;
-    }
-    this.source.reveal();
-  }
-
   listenToPicture() {
-    const { front, picture } = this;
+    const { front } = this;
     /** @type {Map<number, {x: number, y: number}>} */
     const pointers = new Map();
     let moved = 0;
+    let isToolUsed = false;
     const at = (/** @type {MouseEvent} */ event) => {
       const box = front.getBoundingClientRect();
       return { x: event.clientX - box.left, y: event.clientY - box.top };
@@ -177,16 +210,30 @@ export class Viewer {
       front.setPointerCapture(event.pointerId);
       pointers.set(event.pointerId, at(event));
       moved = 0;
+      if (pointers.size > 1) {
+        // Two fingers zoom, also while a tool is in use.
+        this.tool?.cancel();
+        isToolUsed = false;
+      } else if (this.tool) {
+        isToolUsed = this.tool.down(this.place(at(event)), event);
+        if (isToolUsed) return this.draw();
+      }
       if (this.isMeasuring) {
-        const [x, y] = picture.toMachine(at(event).x, at(event).y);
-        picture.measured = [x, y, x, y];
+        const [x, y] = this.picture.toMachine(at(event).x, at(event).y);
+        this.picture.measured = [x, y, x, y];
       }
       front.classList.add("dragging");
     });
     front.addEventListener("pointermove", (event) => {
       const here = at(event);
       const before = pointers.get(event.pointerId);
+      if (!before) this.tool?.hover(this.place(here), front);
       if (!before) return this.showPlace(here);
+      if (isToolUsed) {
+        this.tool?.move(this.place(here), event);
+        this.showPlace(here);
+        return this.draw();
+      }
       pointers.set(event.pointerId, here);
       const [dx, dy] = [here.x - before.x, here.y - before.y];
       moved += Math.abs(dx) + Math.abs(dy);
@@ -194,20 +241,27 @@ export class Viewer {
         const [one, two] = [...pointers.values()];
         const other = one === here ? two : one;
         const [old, now] = [Math.hypot(before.x - other.x, before.y - other.y), Math.hypot(here.x - other.x, here.y - other.y)];
-        if (old > 1) picture.zoom(now / old, (here.x + other.x) / 2, (here.y + other.y) / 2);
-        picture.pan(dx / 2, dy / 2);
-      } else if (this.isMeasuring && picture.measured) {
-        const [x, y] = picture.toMachine(here.x, here.y);
-        picture.measured = [picture.measured[0], picture.measured[1], x, y];
+        if (old > 1) this.picture.zoom(now / old, (here.x + other.x) / 2, (here.y + other.y) / 2);
+        this.picture.pan(dx / 2, dy / 2);
+      } else if (this.isMeasuring && this.picture.measured) {
+        const [x, y] = this.picture.toMachine(here.x, here.y);
+        this.picture.measured = [this.picture.measured[0], this.picture.measured[1], x, y];
         this.showMeasured();
       } else if (moved > 3) {
-        picture.pan(dx, dy);
+        this.picture.pan(dx, dy);
       }
       this.draw();
     });
     const end = (/** @type {PointerEvent} */ event) => {
       const here = pointers.get(event.pointerId);
       pointers.delete(event.pointerId);
+      if (isToolUsed && pointers.size === 0) {
+        isToolUsed = false;
+        front.classList.remove("dragging");
+        if (event.type === "pointerup") this.tool?.up(this.place(at(event)), event);
+        else this.tool?.cancel();
+        return this.draw();
+      }
       if (pointers.size === 0) front.classList.remove("dragging");
       if (event.type === "pointerup" && here && moved <= 3 && !this.isMeasuring) this.pick(here.x, here.y);
     };
@@ -217,10 +271,10 @@ export class Viewer {
     front.addEventListener("wheel", (event) => {
       event.preventDefault();
       const { x, y } = at(event);
-      picture.zoom(Math.exp(-event.deltaY * 0.0015), x, y);
+      this.picture.zoom(Math.exp(-event.deltaY * 0.0015), x, y);
       this.draw();
     }, { passive: false });
-    front.addEventListener("dblclick", () => this.isMeasuring || this.fit());
+    front.addEventListener("dblclick", () => this.isMeasuring || this.tool || this.fit());
   }
 
   /** @param {number} factor */
@@ -232,6 +286,11 @@ export class Viewer {
   fit() {
     this.picture.fit();
     this.draw();
+  }
+
+  /** A place on the stage in machine mm. @param {{x: number, y: number}} place */
+  place({ x, y }) {
+    return this.picture.toMachine(x, y);
   }
 
   /** @param {{x: number, y: number}} place */
@@ -261,6 +320,10 @@ export class Viewer {
   key(event) {
     const target = /** @type {HTMLElement} */ (event.target);
     if (event.ctrlKey || event.altKey || event.metaKey || ["SELECT", "INPUT", "TEXTAREA"].includes(target.tagName)) return;
+    if (target === this.front && this.tool?.key(event.key, event.shiftKey)) {
+      event.preventDefault();
+      return this.draw();
+    }
     const isControl = ["BUTTON", "SUMMARY"].includes(target.tagName);
     if (isControl && (event.key === " " || event.key === "Enter")) return;
     const onPicture = target === this.front;
@@ -492,6 +555,7 @@ export class Viewer {
       predictedRow: this.predicted ? rowAt(this.predicted.t, this.t) : 0,
       predictedMotors: this.predicted ? motorsAt(this.predicted, this.t) : null,
       isPlaying: this.isPlaying,
+      tool: this.tool,
     });
     this.scrubber.set(this.t);
     this.strips?.setHead(this.t, this.isPlaying);

@@ -19,6 +19,8 @@ const SAMPLED: usize = 1 << 16;
 pub struct Columns {
     bytes: Vec<u8>,
     list: Vec<Column>,
+    /// The order of differences is fixed instead of chosen for the least size.
+    is_quick: bool,
 }
 
 /// Where a column lies and how it is read.
@@ -35,11 +37,16 @@ pub struct Column {
 }
 
 impl Columns {
+    /// For columns that are not stored: the order of differences is not searched.
+    pub fn quick() -> Self {
+        Self { is_quick: true, ..Self::default() }
+    }
+
     /// Adds a column of numbers. Their differences, up to the third ones, must be below 2^53.
     pub fn numbers(&mut self, name: &'static str, values: &[i64]) {
         let sample = &values[..values.len().min(SAMPLED)];
         let size = |order: &u32| deflated(&varints(sample, *order)).len();
-        let order = (0..=MOST_ORDER).min_by_key(size).unwrap_or_default();
+        let order = if self.is_quick { 1 } else { (0..=MOST_ORDER).min_by_key(size).unwrap_or_default() };
         let bytes = varints(values, order);
         self.list.push(Column { name, count: Some(values.len()), order, bytes: bytes.len() });
         self.bytes.extend(bytes);
@@ -54,6 +61,11 @@ impl Columns {
     /// The columns in their order.
     pub fn list(&self) -> &[Column] {
         &self.list
+    }
+
+    /// All columns, not deflated.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// All columns, deflated, in base64.
@@ -140,6 +152,14 @@ mod tests {
             columns.numbers("list", list);
         }
         assert_eq!(unpacked(&columns), lists);
+    }
+
+    #[test]
+    fn quick_columns_come_back() {
+        let mut columns = Columns::quick();
+        columns.numbers("list", &[5, 7, -1_000_000]);
+        assert_eq!(unpacked(&columns), [[5, 7, -1_000_000]]);
+        assert_eq!(columns.bytes().len(), columns.list()[0].bytes);
     }
 
     #[test]

@@ -2,12 +2,16 @@
 // references.
 
 import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
 import { chromium } from "playwright-core";
 
 /** The folder of pages that `cargo xtask web-test` wrote. */
 export const PAGES = process.env.PLOTPLAN_PAGES ?? "";
+/** The program, and the studio's files. */
+export const PROGRAM = process.env.PLOTPLAN_PROGRAM ?? "plotplan";
+const STUDIO = process.env.PLOTPLAN_STUDIO_FILES ?? "";
 /** References are written instead of compared. */
 const WRITES = process.env.PLOTPLAN_WRITE_SCREENSHOTS === "1";
 const REFERENCES = path.join(import.meta.dirname, "screenshots");
@@ -58,6 +62,59 @@ export async function onPage(name, options, check) {
     const result = await check(page);
     assert.deepEqual(events, []);
     assert.equal(requests.length, 1, requests.join(" "));
+    return result;
+  } finally {
+    await context.close();
+  }
+}
+
+/** The studio's address, while the program serves it. */
+let address = "";
+
+/** Has the program serve the studio; returns what ends it. */
+export async function serve() {
+  const server = spawn(PROGRAM, ["studio", "--no-open", "--port", "0", "--files", STUDIO], { stdio: ["ignore", "ignore", "pipe"] });
+  address = await new Promise((done, failed) => {
+    let text = "";
+    server.stderr.on("data", (data) => {
+      text += data;
+      const found = /http:\/\/127\.0\.0\.1:\d+\//.exec(text);
+      if (found) done(found[0]);
+    });
+    server.on("exit", () => failed(new Error(text)));
+  });
+  return () => server.kill();
+}
+
+/**
+ * Opens the studio anew, runs `check`, and requires that nothing was written to the console, nothing failed,
+ * and nothing was asked for but the studio's own files.
+ */
+export async function onStudio(options, check) {
+  const { width = 1280, height = 800, scheme = "light", touch = false, mayFail = false } = options;
+  const context = await (await open()).newContext({
+    viewport: { width, height },
+    colorScheme: scheme,
+    hasTouch: touch,
+    reducedMotion: "reduce",
+    acceptDownloads: true,
+  });
+  const page = await context.newPage();
+  const events = [];
+  page.on("console", (message) => events.push(`console: ${message.text()}`));
+  page.on("pageerror", (error) => events.push(`error: ${error.message}`));
+  const outside = [];
+  context.on("request", (request) => {
+    const url = request.url();
+    if (!url.startsWith(address) && !url.startsWith("blob:") && !url.startsWith("data:")) outside.push(url);
+  });
+  try {
+    await page.goto(address);
+    await page.waitForSelector("html[data-studio]", { timeout: 30_000 });
+    await settled(page);
+    const result = await check(page);
+    if (!mayFail) assert.deepEqual(events, []);
+    assert.deepEqual(outside, []);
     return result;
   } finally {
     await context.close();

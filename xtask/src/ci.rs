@@ -30,9 +30,7 @@ const STEPS: &[Step] = &[
     step("clippy", "lints", || cargo("clippy --workspace --all-targets --locked -- -D warnings")),
     step("doc", "documentation builds without warnings", doc),
     step("test", "the test command of the README; installs gcc-avr and avr-libc if missing", test),
-    step("wasm", "the compiler library builds for WebAssembly", || {
-        check("wasm32-unknown-unknown", "plotplan-compiler")
-    }),
+    step("web", "the studio builds for WebAssembly", || crate::web::build().map(|_| ())),
     step("windows", "the program compiles for Windows", || check("x86_64-pc-windows-gnu", "plotplan")),
     step("macos", "the program compiles for macOS", || check("aarch64-apple-darwin", "plotplan")),
     step("package", "every crate can be packaged", || {
@@ -172,9 +170,14 @@ fn doc() -> Result<()> {
     )
 }
 
-/// Type-checks a package for another target, and installs the target's standard library if missing.
-/// No linker or C compiler for the target is needed.
+/// Type-checks a package for another target. No linker or C compiler for the target is needed.
 fn check(target: &str, package: &str) -> Result<()> {
+    add_target(target)?;
+    cargo(&format!("check --locked --target {target} -p {package}"))
+}
+
+/// Installs the standard library of a target if it is missing.
+pub(crate) fn add_target(target: &str) -> Result<()> {
     let installed = Command::new("rustup")
         .args(["target", "list", "--installed"])
         .current_dir(crate::top())
@@ -183,7 +186,7 @@ fn check(target: &str, package: &str) -> Result<()> {
     if !String::from_utf8_lossy(&installed.stdout).lines().any(|line| line == target) {
         run("rustup", &format!("target add {target}"))?;
     }
-    cargo(&format!("check --locked --target {target} -p {package}"))
+    Ok(())
 }
 
 fn corpus() -> Result<()> {

@@ -52,6 +52,7 @@ pub(crate) fn run(words: &[&str]) -> Result<bool> {
     }
     let out = crate::top().join("target/dist");
     std::fs::create_dir_all(&out)?;
+    crate::web::build()?;
     let native = build(&TARGETS[0])?;
     let extras = extras(&native, &out)?;
     let mut failed = Vec::new();
@@ -88,6 +89,7 @@ fn build(target: &Target) -> Result<PathBuf> {
     let mut command = Command::new("cargo");
     command.arg(if target.by_rust { "build" } else { "zigbuild" });
     command.args(["--release", "--locked", "-p", "plotplan", "--target", target.triple]);
+    command.env("PLOTPLAN_STUDIO", "target/studio");
     // Pure Rust: its own linker is enough.
     command.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld");
     execute(&mut command)

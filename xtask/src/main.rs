@@ -18,6 +18,7 @@ mod site;
 mod svg_peers;
 mod tidy;
 mod trust;
+mod web;
 mod web_test;
 
 const USAGE: &str = "usage: cargo xtask COMMAND
@@ -35,9 +36,11 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   inkscape DIR  compare the SVG importer with Inkscape's HP-GL export on every SVG file in DIR: length,
                 and again without the cause that peers.toml names (skipped if it is not installed)
   order DIR     plan every drawing below DIR in file order and in optimized order, on two machines
+  web           build the studio's static files into target/studio
   web-test [PROGRAM] [--write]
-                test animated previews in a browser, written by PROGRAM or the release build; installs
-                Node.js, Chromium and npm packages if missing; --write makes new reference screenshots
+                test animated previews, written by PROGRAM or the release build, and the studio in a
+                browser; installs Node.js, Chromium and npm packages if missing; --write makes new
+                reference screenshots
   bound [PYTHON] [--all]
                 the fastest motion within the tolerance for a set of strokes, with casadi, which is
                 installed below target/; computes what the table of the planner's tests lacks
@@ -81,6 +84,7 @@ fn main() -> ExitCode {
         ["trust", "--needs"] => trust::needs(),
         ["trust", ref words @ ..] => trust::run(words),
         ["nightly", ref words @ ..] => trust::nightly(words),
+        ["web"] => web::run(),
         ["corpus", folder] => corpus::run(folder.as_ref()),
         ["bound"] => bound::run("python3", false),
         ["bound", "--all"] => bound::run("python3", true),

@@ -39,6 +39,22 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "studio",
+        &[
+            "backends",
+            "compiler",
+            "drawing",
+            "hpgl",
+            "kinematics",
+            "ordering",
+            "picture",
+            "plan",
+            "planner",
+            "viewer",
+        ],
+    ),
+    ("studio-wasm", &["studio"]),
+    (
         "plotplan",
         &[
             "backends",
@@ -52,6 +68,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "plan",
             "planner",
             "simulation",
+            // Its outputs are compared with the program's.
+            "studio",
             "verify",
         ],
     ),
@@ -85,8 +103,8 @@ const RESERVED: &[(&str, &[&str])] = &[
     // In the binary for projects, whose keys are options of the command line.
     ("toml", &["backends", "compiler", "plotplan", "xtask"]),
     ("toml_edit", &["compiler", "plotplan"]),
-    ("serde", &["backends", "compiler", "plan", "plotplan"]),
-    ("serde_json", &["backends", "compiler", "plan", "plotplan", "xtask"]),
+    ("serde", &["backends", "compiler", "plan", "plotplan", "studio"]),
+    ("serde_json", &["backends", "compiler", "plan", "plotplan", "studio", "xtask"]),
 ];
 
 /// Absolute paths of a development machine, which must not be committed.
@@ -99,7 +117,8 @@ const LONG: usize = 800;
 pub(crate) fn run() -> Result<bool> {
     let top = crate::top();
     let mut violations = Vec::new();
-    let mut manifests = vec![top.join("viewer/Cargo.toml"), top.join("xtask/Cargo.toml")];
+    let folders = ["viewer", "studio", "studio/wasm", "xtask"];
+    let mut manifests: Vec<_> = folders.iter().map(|folder| top.join(folder).join("Cargo.toml")).collect();
     for entry in std::fs::read_dir(top.join("crates")).context("cannot list the folder crates")? {
         manifests.push(entry?.path().join("Cargo.toml"));
     }

@@ -1,5 +1,6 @@
-//! Tests of the viewer in a browser: playwright's core package with Debian's Chromium.
+//! Tests of the viewer and the studio in a browser: playwright's core package with Debian's Chromium.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,7 +26,10 @@ pub(crate) fn run(program: Option<&str>, write: bool) -> Result<bool> {
     let top = crate::top();
     let (tests, pages) = (top.join("viewer/test"), top.join("target/web-test"));
     install(&tests)?;
-    execute(Command::new(tests.join("node_modules/.bin/tsc")).args(["-p", "viewer"]))?;
+    for project in ["viewer", "studio"] {
+        execute(Command::new(tests.join("node_modules/.bin/tsc")).args(["-p", project]))?;
+    }
+    let studio = crate::web::build()?;
     let program = if let Some(program) = program {
         PathBuf::from(program)
     } else {
@@ -35,8 +39,11 @@ pub(crate) fn run(program: Option<&str>, write: bool) -> Result<bool> {
     std::fs::create_dir_all(&pages).with_context(|| format!("{}", pages.display()))?;
     write_pages(&program, &pages)?;
     let mut command = Command::new("node");
-    command.args(["--test", "--test-reporter=spec", "viewer/test/viewer.test.mjs"]);
+    command.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]);
+    command.args(["viewer/test/viewer.test.mjs", "viewer/test/studio.test.mjs"]);
     command.env("PLOTPLAN_PAGES", std::path::absolute(&pages)?);
+    command.env("PLOTPLAN_PROGRAM", std::path::absolute(&program)?);
+    command.env("PLOTPLAN_STUDIO_FILES", studio);
     if write {
         command.env("PLOTPLAN_WRITE_SCREENSHOTS", "1");
     }
@@ -79,19 +86,20 @@ fn install(tests: &Path) -> Result<()> {
 }
 
 fn write_pages(program: &Path, pages: &Path) -> Result<()> {
-    let write = |command: &str, to: &str| {
-        let words = command.split(' ').chain(["--quiet", "--output"]);
-        execute(Command::new(program).args(words).arg(pages.join(to)))
+    // The folder's name may have blanks.
+    let write = |words: &mut dyn Iterator<Item = &OsStr>, to: &str| {
+        execute(Command::new(program).args(words).args(["--quiet", "--output"]).arg(pages.join(to)))
     };
     for (name, command) in PAGES {
-        write(command, name)?;
+        write(&mut command.split(' ').map(OsStr::new), name)?;
     }
-    write("convert examples/zot.hpgl --machine coaxial", "zot.ticks")?;
+    write(&mut "convert examples/zot.hpgl --machine coaxial".split(' ').map(OsStr::new), "zot.ticks")?;
     let plan = pages.join("zot.ticks");
-    write(&format!("preview {}", plan.display()), "plan.html")?;
+    write(&mut ["preview".as_ref(), plan.as_os_str()].into_iter(), "plan.html")?;
     let drawing = pages.join("many.hpgl");
     std::fs::write(&drawing, many()).with_context(|| format!("{}", drawing.display()))?;
-    write(&format!("preview {} --machine corexy --order file", drawing.display()), "many.html")
+    let options = "--machine corexy --order file".split(' ').map(OsStr::new);
+    write(&mut ["preview".as_ref(), drawing.as_os_str()].into_iter().chain(options), "many.html")
 }
 
 /// A drawing of many short strokes, one beside the other.

@@ -44,6 +44,7 @@ pub mod import;
 pub mod layout;
 pub mod machine_file;
 pub mod new_machine;
+pub mod option;
 pub mod paper;
 pub mod pipeline;
 pub mod quantity;

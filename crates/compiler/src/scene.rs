@@ -31,7 +31,7 @@ pub fn of_placed(title: &str, drawing: &Drawing, machine: &Machine, colors: PenC
 }
 
 /// The parts of a drawing that the machine cannot draw, in steps of 0.5 mm.
-fn beyond_reach(drawing: &Drawing, machine: &Machine) -> Vec<ColoredLine> {
+pub fn beyond_reach(drawing: &Drawing, machine: &Machine) -> Vec<ColoredLine> {
     const STEP_MM: f64 = 0.5;
     let is_beyond = |point: Point| machine.check_point(point).is_err();
     let mut lines = Vec::new();

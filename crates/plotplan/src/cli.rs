@@ -5,6 +5,7 @@ mod format;
 mod ink;
 mod project;
 mod reading;
+mod studio;
 mod values;
 
 use std::path::Path;
@@ -21,6 +22,7 @@ pub(crate) use format::Format;
 pub(crate) use ink::{InkColor, with_ink_color};
 pub(crate) use project::{Build, Diff, Init};
 pub(crate) use reading::{PageChoice, Reading, TextForm};
+pub(crate) use studio::Studio;
 use values::{align, angle, length, name, pen, place, scale, ticks, time};
 
 /// Compiles pen-plotter drawings (HPGL, HP-GL/2, SVG) to motor motion.
@@ -105,6 +107,8 @@ pub(crate) enum Command {
     Init(Init),
     /// Compare two plans, drawings or machine files, in any mix
     Diff(Diff),
+    /// Serve the page that sketches, places and plans drawings in the browser
+    Studio(Studio),
     /// Emulate a controller on a pseudo-terminal
     #[cfg(unix)]
     #[command(alias = "device")]
@@ -676,6 +680,7 @@ impl Command {
             Self::Build(_) => "build",
             Self::Init(_) => "init",
             Self::Diff(_) => "diff",
+            Self::Studio(_) => "studio",
             #[cfg(unix)]
             Self::Emulate(_) => "emulate",
             Self::Machine(Machine::List) => "machine list",

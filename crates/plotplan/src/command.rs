@@ -16,6 +16,7 @@ mod page;
 mod preview;
 mod send;
 mod simulate;
+mod studio;
 mod tune;
 mod verify;
 
@@ -48,6 +49,7 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Build(build) => build::run(build),
         Command::Init(init) => build::init(init),
         Command::Diff(diff) => diff::run(diff),
+        Command::Studio(studio) => studio::run(studio),
         #[cfg(unix)]
         Command::Emulate(emulate) => emulate::run(emulate),
         Command::Machine(machine) => machine::run(machine),

@@ -11,7 +11,7 @@ use kinematics::{Anchor, JointAffine, JointKind, Machine, reach_outlines};
 use plan::{Header, Row};
 use serde_json::{Value, json};
 use simulation::Sample;
-use viewer::Columns;
+use viewer::{Column, Columns};
 
 pub use self::scenes::ColorBy;
 pub(crate) use self::scenes::label;
@@ -125,7 +125,11 @@ impl View<'_> {
 
     /// The view as the data of the viewer: what `js/viewer.js` reads.
     pub fn data(&self) -> (Value, Columns) {
-        let mut columns = Columns::default();
+        self.data_into(Columns::default())
+    }
+
+    /// The same, in these columns.
+    pub fn data_into(&self, mut columns: Columns) -> (Value, Columns) {
         let units = self.rows_into(&mut columns);
         let traced = self
             .drawing
@@ -150,14 +154,6 @@ impl View<'_> {
         if let Some(prediction) = &self.prediction {
             prediction_into(prediction, units, &mut columns);
         }
-        let list: Vec<Value> = columns
-            .list()
-            .iter()
-            .map(|column| {
-                let count = column.count.map_or(-1, |count| count as i64);
-                json!({ "name": column.name, "count": count, "order": column.order, "bytes": column.bytes })
-            })
-            .collect();
         let subtitle = format!("on {}", self.machine.name());
         let meta = json!({
             "program": concat!("plotplan ", env!("CARGO_PKG_VERSION")),
@@ -170,7 +166,7 @@ impl View<'_> {
             "tick_units": units,
             "deviation_unit_mm": deviation_unit_mm,
             "pens": self.pens(),
-            "columns": list,
+            "columns": description(&columns),
             "summary": self.summary,
             "certificate": self.certificate,
             "diagnostics": self.diagnostics(),
@@ -291,6 +287,15 @@ impl View<'_> {
             })
             .collect()
     }
+}
+
+/// How `js/columns.js` reads columns.
+pub fn description(columns: &Columns) -> Value {
+    let column = |column: &Column| {
+        let count = column.count.map_or(-1, |count| count as i64);
+        json!({ "name": column.name, "count": count, "order": column.order, "bytes": column.bytes })
+    };
+    columns.list().iter().map(column).collect()
 }
 
 /// The nearest tick to an exact position: the row's own, where it is one of two.

@@ -1,57 +1,13 @@
 //! Values of options as text: lengths, angles, places, pens.
 
 use compiler::layout::Crop;
-use compiler::{import, quantity};
+pub(super) use compiler::option::{align, angle, hatch, length, place, scale, time};
 
 use super::PageChoice;
-
-pub(super) fn align(text: &str) -> Result<(f64, f64), String> {
-    let (mut x, mut y) = (0.5, 0.5);
-    for word in text.split('-') {
-        match word {
-            "left" => x = 0.0,
-            "right" => x = 1.0,
-            "bottom" => y = 0.0,
-            "top" => y = 1.0,
-            "center" | "centre" | "middle" => {}
-            _ => {
-                return Err("expected center, left, right, top, bottom or a corner such as top-left".into());
-            }
-        }
-    }
-    Ok((x, y))
-}
-
-pub(super) fn scale(text: &str) -> Result<f64, String> {
-    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
-    let factor = number.trim().parse::<f64>().ok().map(|factor| factor * unit);
-    factor
-        .filter(|factor| *factor > 0.0 && factor.is_finite())
-        .ok_or_else(|| "expected a positive factor such as 0.5, or a percentage such as 50%".to_owned())
-}
 
 /// The name of a file, a machine, a port or the like.
 pub(super) fn name() -> clap::builder::NonEmptyStringValueParser {
     clap::builder::NonEmptyStringValueParser::new()
-}
-
-/// An angle in rad, at most a full turn; a bare number is in degrees.
-pub(super) fn angle(text: &str) -> Result<f64, String> {
-    let degrees = text.trim().parse::<f64>().ok().filter(|degrees| degrees.is_finite());
-    let angle = match degrees {
-        Some(degrees) => degrees.to_radians(),
-        None => quantity::angle_rad(text).map_err(|_| {
-            "expected an angle in degrees such as 90, or with a unit such as 1.57rad".to_owned()
-        })?,
-    };
-    if angle.abs() > std::f64::consts::TAU + 1e-9 {
-        return Err("expected an angle of at most a full turn: -360 to 360 degrees".to_owned());
-    }
-    Ok(angle)
-}
-
-pub(super) fn length(text: &str) -> Result<f64, String> {
-    quantity::length_mm(text, true).map_err(|error| error.to_string())
 }
 
 /// A positive length in mm.
@@ -65,16 +21,6 @@ pub(super) fn jobs(text: &str) -> Result<usize, String> {
         .ok()
         .filter(|jobs| (1..=1024).contains(jobs))
         .ok_or_else(|| "expected a number from 1".to_owned())
-}
-
-/// Spacing of a hatch, and its angle after a comma.
-pub(super) fn hatch(text: &str) -> Result<import::Hatch, String> {
-    let (spacing, direction) = text.split_once(',').unwrap_or((text, "0"));
-    let spacing_mm = length(spacing)?;
-    if !(1e-3..1e4).contains(&spacing_mm) {
-        return Err("the spacing must be between 0.001 mm and 10 m".into());
-    }
-    Ok(import::Hatch { spacing_mm, angle_rad: angle(direction)? })
 }
 
 pub(super) fn page(text: &str) -> Result<PageChoice, String> {
@@ -164,14 +110,4 @@ pub(super) fn fault(text: &str) -> Result<backends::Fault, String> {
         "switch-stuck" => Fault::Switch(SwitchFault::Stuck(number(first)?.min(1) as u8)),
         _ => return Err(what.to_owned()),
     })
-}
-
-pub(super) fn time(text: &str) -> Result<f64, String> {
-    quantity::time_s(text).map_err(|error| error.to_string())
-}
-
-pub(super) fn place(text: &str) -> Result<(f64, f64), String> {
-    let (x, y) =
-        text.split_once(',').ok_or("a place is two lengths with a comma between, such as 10mm,2cm")?;
-    Ok((length(x)?, length(y)?))
 }

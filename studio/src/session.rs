@@ -1,0 +1,390 @@
+//! An opened drawing, and its last plan.
+
+use compiler::import::{self, Document, Page};
+use compiler::machine_file::MachineFile;
+use compiler::pipeline::{self, Request, Step};
+use compiler::report::{CertificateReport, DrawingReport, Finding, Summary};
+use compiler::scene;
+use compiler::view::{DrawingView, SourceFile, View, description};
+use drawing::{Affine, Drawing, Span};
+use kinematics::Machine;
+use plan::{Header, Limits, Motor, Row};
+use planner::{PlacementOptions, PlanError, Scale};
+use serde_json::{Value, json};
+use viewer::Columns;
+
+use crate::job::Job;
+use crate::problem::{About, Problem, Problems};
+
+/// Chords of outlines deviate from the drawing by at most this, mm.
+const OUTLINE_MM: f64 = 0.05;
+
+/// The worker of a page: a drawing, and the last plan made of it.
+#[derive(Debug, Default)]
+pub struct Studio {
+    name: String,
+    bytes: Vec<u8>,
+    /// The drawing as it was read with these options.
+    read: Option<(import::Options, Document)>,
+    /// The last plan that was no draft.
+    planned: Option<Planned>,
+}
+
+/// An answer: a JSON object, and columns that it describes for `viewer/js/columns.js`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reply {
+    /// The object.
+    pub json: Value,
+    /// The columns' bytes.
+    pub columns: Vec<u8>,
+}
+
+/// A plan with all that outputs need of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Planned {
+    job: Job,
+    pub(crate) file: MachineFile,
+    pub(crate) machine: Machine,
+    pub(crate) page: Page,
+    pub(crate) page_number: usize,
+    pub(crate) request: Request,
+    pub(crate) header: Header,
+    pub(crate) rows: Vec<Row>,
+    pub(crate) exact: Vec<[f64; 2]>,
+    /// In the order drawn, machine mm.
+    pub(crate) drawn: Drawing,
+    placed: Drawing,
+    pub(crate) summary: Summary,
+    pub(crate) certificate: CertificateReport,
+    beyond_sheet_mm: f64,
+}
+
+impl Studio {
+    /// Opens a drawing's file in place of the one before.
+    pub fn open(&mut self, name: &str, bytes: &[u8]) {
+        *self = Self { name: name.to_owned(), bytes: bytes.to_vec(), read: None, planned: None };
+    }
+
+    /// The name of the drawing's file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// SHA-256 of the drawing's file.
+    pub(crate) fn sha256(&self) -> String {
+        import::sha256(&self.bytes)
+    }
+
+    /// The drawing's file, read as the job asks, and the page that the job asks for.
+    pub(crate) fn page(&mut self, job: &Job) -> Result<(Page, usize), Problems> {
+        if self.bytes.iter().all(u8::is_ascii_whitespace) {
+            return Err(Problem::new(About::Drawing, format!("{} is empty", self.name)).into());
+        }
+        if plan::file::is_plan(&self.bytes) {
+            return Err(Problem::new(About::Drawing, format!("{} is a plan, not a drawing", self.name))
+                .with_help("`plotplan preview` shows plans")
+                .into());
+        }
+        let options = job.options.reading()?;
+        if self.read.as_ref().is_none_or(|(given, _)| *given != options) {
+            let read = import::read(&self.bytes, &options);
+            let document =
+                read.map_err(|error| Problem::new(About::Drawing, format!("{}: {error}", self.name)))?;
+            self.read = Some((options, document));
+        }
+        let number = job.options.page()?;
+        let pages = self.read.as_ref().map_or(&[][..], |(_, document)| &document.pages);
+        let page = pages.get(number - 1).cloned().ok_or_else(|| Problem {
+            option: Some("page"),
+            ..Problem::new(
+                About::Option,
+                format!("{} has {} pages, not page {number}", self.name, pages.len()),
+            )
+        })?;
+        Ok((page, number))
+    }
+
+    /// The job without options that this drawing's format does not have: the page keeps those of SVG when a
+    /// drawing of another format is opened.
+    pub(crate) fn settled(&self, job: &Job) -> Job {
+        let mut job = job.clone();
+        if import::format(&self.bytes) != "SVG" {
+            (job.options.pens, job.options.hatch) = (String::new(), String::new());
+            job.options.outline_fills = false;
+        }
+        job
+    }
+
+    /// What was found in the drawing's file.
+    fn findings(&self) -> Vec<Finding> {
+        let found = self.read.as_ref().map_or(&[][..], |(_, document)| &document.diagnostics);
+        found.iter().map(|diagnostic| Finding::of(&self.name, diagnostic)).collect()
+    }
+
+    /// Stops where the drawing lacks something or draws nothing, as the program does.
+    pub(crate) fn refuse_unusable(&self, page: &Page) -> Result<(), Problems> {
+        let Some((_, document)) = &self.read else { return Ok(()) };
+        let errors = document.diagnostics.iter().filter(|found| found.severity == import::Severity::Error);
+        let problems: Vec<Problem> = errors
+            .map(|found| Problem {
+                help: found.help.clone(),
+                bytes: Some([found.span.start, found.span.end]),
+                ..Problem::new(About::Drawing, format!("{} {}: {}", found.code, found.place, found.message))
+            })
+            .collect();
+        if !problems.is_empty() {
+            return Err(Problems(problems));
+        }
+        if page.drawing.is_empty() {
+            let what = format!("{} draws nothing: no ink in its {}", self.name, document.size);
+            return Err(Problem::new(About::Drawing, what).into());
+        }
+        Ok(())
+    }
+
+    /// The drawing: its report and findings, and as columns its outlines: `count` points and the `pen` of
+    /// each stroke, `x` and `y` of each point in micrometres of the drawing's frame.
+    ///
+    /// # Errors
+    /// A file that is no drawing, options that cannot be read.
+    pub fn drawing(&mut self, job: &Job) -> Result<Reply, Problems> {
+        let job = &self.settled(job);
+        let (page, number) = self.page(job)?;
+        let [mut counts, mut pens, mut x, mut y] = [const { Vec::new() }; 4];
+        let micrometres = |mm: f64| (mm * 1000.0).round() as i64;
+        for stroke in &page.drawing.strokes {
+            let points = stroke.flatten(OUTLINE_MM);
+            counts.push(points.len() as i64);
+            pens.push(i64::from(stroke.pen.0));
+            x.extend(points.iter().map(|point| micrometres(point.x)));
+            y.extend(points.iter().map(|point| micrometres(point.y)));
+        }
+        let mut columns = Columns::quick();
+        for (name, values) in [("count", &counts), ("pen", &pens), ("x", &x), ("y", &y)] {
+            columns.numbers(name, values);
+        }
+        let report = self.read.as_ref().map(|(_, document)| DrawingReport::of(document));
+        let bounds = page.drawing.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
+        let json = json!({
+            "name": self.name,
+            "page": number,
+            "bounds_mm": bounds,
+            "report": report,
+            "findings": self.findings(),
+            "columns": description(&columns),
+        });
+        Ok(Reply { json, columns: columns.bytes().to_vec() })
+    }
+
+    /// A machine without a drawing, at its start pose, for the viewer.
+    ///
+    /// # Errors
+    /// What is wrong with the machine file.
+    pub fn machine(&self, job: &Job) -> Result<Reply, Problems> {
+        let (_, machine) = job.machine.read()?;
+        Ok(standing(&machine, "No drawing"))
+    }
+
+    /// Plans the drawing, for the viewer: `meta` and the columns are those that `viewer/js/viewer.js` shows.
+    /// Where the drawing cannot be planned, `problems` are the reasons and the viewer shows the machine.
+    ///
+    /// # Errors
+    /// What is wrong with the machine file, the drawing's file or the options.
+    pub fn plan(&mut self, job: &Job, progress: &dyn Fn(Step)) -> Result<Reply, Problems> {
+        let job = &self.settled(job);
+        let (_, machine) = job.machine.read()?;
+        let (page, _) = self.page(job)?;
+        self.refuse_unusable(&page)?;
+        match self.planned(job, progress) {
+            Ok(planned) => Ok(self.view(&planned)),
+            Err(problems) => {
+                let reply = standing(&machine, &self.name);
+                let placed = job
+                    .options
+                    .placement()
+                    .ok()
+                    .and_then(|options| planner::place(&machine, &page.drawing, &options).ok());
+                let mut json = reply.json;
+                json["problems"] = json!(problems.0);
+                if let Some(placement) = placed {
+                    let mut drawing = page.drawing;
+                    drawing.transform(placement);
+                    let beyond: Vec<Vec<f64>> = scene::beyond_reach(&drawing, &machine)
+                        .iter()
+                        .map(|line| line.points.iter().flat_map(|point| [point.x, point.y]).collect())
+                        .collect();
+                    json["placement"] = json!(placement.as_coeffs());
+                    json["beyond_mm"] = json!(beyond);
+                }
+                Ok(Reply { json, columns: reply.columns })
+            }
+        }
+    }
+
+    /// Plans the drawing. A plan that was made before is made again only if the job is another one.
+    pub(crate) fn planned(&mut self, job: &Job, progress: &dyn Fn(Step)) -> Result<Planned, Problems> {
+        if let Some(planned) = self.planned.as_ref().filter(|planned| planned.job == *job) {
+            return Ok(planned.clone());
+        }
+        let (file, machine) = job.machine.read()?;
+        let (page, page_number) = self.page(job)?;
+        self.refuse_unusable(&page)?;
+        let request = job.request(&page, &machine)?;
+        let compiled = pipeline::compile(&page.drawing, &machine, &request, progress)
+            .map_err(|error| refusal(&page.drawing, &machine, &request, &error))?;
+        if !compiled.may_be_written(false) {
+            let failures = compiled.certificate.failures.iter().map(ToString::to_string);
+            let what = format!("the certificate does not hold: {}", failures.collect::<Vec<_>>().join("; "));
+            return Err(Problem::new(About::Plan, what).into());
+        }
+        let (rows, exact) = compiled.trajectory.rows().map(|row| (row.row, row.exact)).unzip();
+        let (summary, certificate) = (Summary::of(&compiled), CertificateReport::of(&compiled.certificate));
+        let (header, drawn) = (compiled.header.clone(), compiled.ordered().clone());
+        let (placed, beyond_sheet_mm) = (compiled.placed.clone(), compiled.beyond_sheet_mm);
+        drop(compiled);
+        let planned = Planned {
+            job: job.clone(),
+            file,
+            machine,
+            page,
+            page_number,
+            request,
+            header,
+            rows,
+            exact,
+            drawn,
+            placed,
+            summary,
+            certificate,
+            beyond_sheet_mm,
+        };
+        if !job.draft {
+            self.planned = Some(planned.clone());
+        }
+        Ok(planned)
+    }
+
+    /// What the viewer shows of a plan.
+    pub(crate) fn view_of<'a>(&'a self, planned: &'a Planned) -> View<'a> {
+        View {
+            title: self.name.clone(),
+            machine: &planned.machine,
+            header: &planned.header,
+            rows: &planned.rows,
+            exact: Some(&planned.exact),
+            drawing: Some(DrawingView {
+                drawn: &planned.drawn,
+                placed: &planned.placed,
+                pens: &planned.page.pens,
+                pen_speeds: &planned.request.pen_speeds,
+                files: vec![SourceFile { name: &self.name, path: &self.name, bytes: &self.bytes }],
+            }),
+            tolerance_mm: planned.request.tolerance_mm,
+            summary: Some(planned.summary.clone()),
+            certificate: Some(planned.certificate.clone()),
+            findings: self.findings(),
+            prediction: None,
+        }
+    }
+
+    fn view(&self, planned: &Planned) -> Reply {
+        let (meta, columns) = self.view_of(planned).data_into(Columns::quick());
+        let ink = planned.placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
+        let json = json!({
+            "meta": meta,
+            "is_draft": planned.job.draft,
+            "placement": planned.header.placement,
+            "ink_mm": ink,
+            "beyond_sheet_mm": planned.beyond_sheet_mm,
+            "problems": [],
+        });
+        Reply { json, columns: columns.bytes().to_vec() }
+    }
+}
+
+/// A machine at its start pose.
+fn standing(machine: &Machine, title: &str) -> Reply {
+    let ticks = machine.motor_positions(&machine.start()).0.map(|ticks| ticks.round() as i64);
+    let rows = [Row { t_us: 0, pen: 0, ticks }];
+    let header = Header {
+        machine: machine.name().to_owned(),
+        motors: machine.motors().clone().map(|motor| Motor {
+            name: motor.name,
+            limits: Limits {
+                speed: motor.max_speed_ticks_s,
+                acceleration: motor.max_acceleration_ticks_s2,
+                jerk: motor.max_jerk_ticks_s3,
+            },
+        }),
+        placement: Affine::IDENTITY.as_coeffs(),
+        period_us: ((machine.parts().period_s * 1e6).round() as u64).max(1),
+        lift_overlap_us: 0,
+        rounding: plan::Rounding::Nearest,
+        pen_colors: std::collections::BTreeMap::new(),
+        rows: 1,
+        duration_us: 0,
+    };
+    let view = View {
+        title: title.to_owned(),
+        machine,
+        header: &header,
+        rows: &rows,
+        exact: None,
+        drawing: None,
+        tolerance_mm: 0.1,
+        summary: None,
+        certificate: None,
+        findings: Vec::new(),
+        prediction: None,
+    };
+    let (meta, columns) = view.data_into(Columns::quick());
+    Reply { json: json!({ "meta": meta, "problems": [] }), columns: columns.bytes().to_vec() }
+}
+
+/// Why a drawing cannot be planned, and what would help.
+pub(crate) fn refusal(
+    drawing: &Drawing,
+    machine: &Machine,
+    request: &Request,
+    error: &PlanError,
+) -> Problems {
+    let problem = match error {
+        PlanError::OutOfReach { source, span: Span { start, end }, .. } => Problem {
+            bytes: Some([*start, *end]),
+            at_mm: Some([source.point.x, source.point.y]),
+            ..Problem::new(
+                About::Plan,
+                format!("The drawing leaves the reach of {}: {source}.", machine.name()),
+            )
+            .with_help(what_fits(drawing, machine, request))
+        },
+        other => Problem::new(About::Plan, capitalized(&other.to_string())),
+    };
+    problem.into()
+}
+
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
+}
+
+/// Which button makes the drawing fit.
+fn what_fits(drawing: &Drawing, machine: &Machine, request: &Request) -> &'static str {
+    let fits = |scale: Scale| {
+        let placement = PlacementOptions { scale, ..request.placement };
+        let placed = pipeline::place(drawing, machine, &placement, None);
+        placed.is_ok_and(|placed| placed.beyond_sheet_mm <= 1e-6)
+    };
+    let factor = match request.placement.scale {
+        Scale::Explicit { factor, .. } | Scale::Aligned { factor, .. } => factor,
+        Scale::Fit | Scale::Shrink => 1.0,
+    };
+    let center = drawing::Vec2::new(0.5, 0.5);
+    if fits(Scale::Aligned { factor, align: center }) {
+        "It fits at this size in the middle of the sheet: Centre."
+    } else if fits(Scale::Fit) {
+        "Fit scales it to the sheet."
+    } else {
+        "Neither Centre nor Fit makes it fit: turn it, or choose another machine."
+    }
+}

@@ -1,0 +1,95 @@
+//! The studio as static files: the compiler as WebAssembly, the page, the viewer's modules.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context as _, Result, ensure};
+
+/// The target of the compiler in the page.
+const TARGET: &str = "wasm32-unknown-unknown";
+
+/// Folders of the page: where they are in the repository and in the studio, and which files they give.
+const FOLDERS: &[(&str, &str, &[&str])] = &[
+    ("studio/web", "", &["css"]),
+    ("studio/web/js", "js", &["js"]),
+    ("viewer", "viewer", &["css"]),
+    ("viewer/js", "viewer/js", &["js"]),
+    ("viewer/vendor/uplot", "viewer/vendor/uplot", &["js", "css"]),
+];
+
+/// Builds the studio into `target/studio`, and prints how to use it.
+pub(crate) fn run() -> Result<bool> {
+    let folder = build()?;
+    let size: u64 =
+        files_below(&folder)?.iter().map(|file| file.metadata().map_or(0, |data| data.len())).sum();
+    println!("the studio: target/studio, {:.1} MB; any static host can serve it", size as f64 / 1e6);
+    println!("  plotplan studio --files target/studio");
+    println!(
+        "  PLOTPLAN_STUDIO=target/studio cargo build --release -p plotplan   # puts it into the program"
+    );
+    Ok(true)
+}
+
+/// Builds the studio; returns its folder.
+pub(crate) fn build() -> Result<PathBuf> {
+    let top = std::path::absolute(crate::top())?;
+    crate::ci::add_target(TARGET)?;
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "-p", "plotplan-studio-wasm"]);
+    let status = cargo.current_dir(&top).status().context("cannot run cargo")?;
+    ensure!(status.success(), "cargo build for {TARGET}: {status}");
+    let folder = top.join("target/studio");
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
+    }
+    for (from, to, extensions) in FOLDERS {
+        let to = folder.join(to);
+        std::fs::create_dir_all(&to)?;
+        for entry in std::fs::read_dir(top.join(from)).with_context(|| (*from).to_owned())? {
+            let path = entry?.path();
+            let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+            if extensions.contains(&extension) {
+                copy(&path, &to.join(path.file_name().context("a file without a name")?))?;
+            }
+        }
+    }
+    std::fs::create_dir_all(folder.join("examples"))?;
+    copy(&top.join("examples/house.hpgl"), &folder.join("examples/house.hpgl"))?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| top.join("target"), PathBuf::from);
+    let wasm = target.join(TARGET).join("web/studio_wasm.wasm");
+    copy(&wasm, &folder.join("studio.wasm"))?;
+    std::fs::write(folder.join("index.html"), page(&top)?)?;
+    Ok(folder)
+}
+
+/// The page: the viewer's markup, with the setup after its header.
+fn page(top: &Path) -> Result<String> {
+    let read = |name: &str| std::fs::read_to_string(top.join(name)).with_context(|| name.to_owned());
+    let (page, setup, viewer) =
+        (read("studio/web/index.html")?, read("studio/web/setup.html")?, read("viewer/index.html")?);
+    let (marker, header) = ("<!-- viewer -->\n", "</header>\n");
+    ensure!(
+        page.matches(marker).count() == 1 && viewer.matches(header).count() == 1,
+        "the page has another form"
+    );
+    Ok(page.replace(marker, &viewer.replace(header, &format!("{header}{setup}"))))
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    std::fs::copy(from, to).with_context(|| format!("{}", from.display()))?;
+    Ok(())
+}
+
+/// All files below a folder.
+fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            files.extend(files_below(&path)?);
+        } else {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}
