@@ -45,8 +45,13 @@ export class Outputs {
       this.say(file.name);
     });
     byId("copy").addEventListener("click", async () => {
-      await navigator.clipboard.writeText(byId("command").textContent ?? "");
-      byId("saved").textContent = "Copied.";
+      try {
+        await navigator.clipboard.writeText(byId("command").textContent ?? "");
+        byId("saved").textContent = "Copied.";
+      } catch {
+        // Browsers allow it on 127.0.0.1 and over HTTPS.
+        byId("saved").textContent = "This browser does not let the page copy: select the text.";
+      }
     });
     this.show();
   }

@@ -80,17 +80,23 @@ export class Sketch {
   /** Starts to sketch. @param {Stroke[]} strokes */
   async begin(strokes) {
     this.studio.placer.end();
-    const isNew = this.studio.state.sketch === null;
+    const { placement } = this.studio.placer;
+    const isPlaced = this.studio.state.sketch !== null && this.studio.hasDrawing && placement;
     this.isOn = true;
-    this.strokes = strokes;
+    this.strokes = isPlaced ? strokes.map((stroke) => this.moved(stroke, placement)) : strokes;
     this.undone = [];
-    if (isNew) {
-      // In its own place on the sheet.
-      Object.assign(this.studio.state.options, { fit: false, align: "", place: "", scale: "", rotate: "", mirror: "", page: "", pens: "" });
-      this.studio.showFields();
-    }
+    // In its own place on the sheet, so that ink appears under the pointer.
+    Object.assign(this.studio.state.options, { fit: false, align: "", place: "", scale: "", rotate: "", mirror: "", page: "", pens: "" });
+    this.studio.showFields();
     this.show();
     await this.changed();
+  }
+
+  /** A stroke where the sketch was placed. @param {Stroke} stroke @param {import("./outline.js").Affine} placement @returns {Stroke} */
+  moved({ pen, points }, [a, b, c, d, e, f]) {
+    const [x0, y0] = this.studio.viewer.meta.machine.sheet_mm;
+    const at = (/** @type {number} */ k) => [a * points[k] + c * points[k + 1] + e - x0, b * points[k] + d * points[k + 1] + f - y0];
+    return { pen, points: points.flatMap((_, k) => (k % 2 === 0 ? at(k).map((mm) => Number(mm.toFixed(3))) : [])) };
   }
 
   /** Leaves the pointer to the picture; the sketch stays. */

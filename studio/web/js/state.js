@@ -56,8 +56,8 @@ export function restored() {
     for (const key of /** @type {const} */ (["smooth", "format", "tab"])) {
       if (typeof stored[key] === "string") fresh[key] = stored[key];
     }
-    if (Array.isArray(stored.sketch)) fresh.sketch = stored.sketch;
-    else if (typeof stored.file?.base64 === "string") fresh.file = stored.file;
+    if (typeof stored.file?.base64 === "string") fresh.file = stored.file;
+    if (Array.isArray(stored.sketch) && fresh.file) fresh.sketch = stored.sketch;
   } catch {
     // A page without storage starts anew every time.
   }

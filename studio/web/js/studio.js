@@ -62,8 +62,7 @@ export class Studio {
     this.showFields();
     this.editor.show();
     this.openTab(state.tab);
-    if (state.sketch) await this.sketch.begin(state.sketch);
-    else if (state.file) await this.open(state.file.name, fromBase64(state.file.base64));
+    if (state.file) await this.open(state.file.name, fromBase64(state.file.base64), state.sketch);
     else await this.plan(false);
   }
 
@@ -133,11 +132,14 @@ export class Studio {
     else await this.open(file.name, bytes);
   }
 
-  /** Opens a drawing and plans it. @param {string} name @param {Uint8Array} bytes */
-  async open(name, bytes) {
+  /**
+   * Opens a drawing and plans it.
+   * @param {string} name @param {Uint8Array} bytes @param {import("./state.js").Stroke[] | null} sketch  if it is one
+   */
+  async open(name, bytes, sketch = null) {
     this.sketch.end();
     this.placer.end();
-    this.state.sketch = null;
+    this.state.sketch = sketch;
     if (name !== this.state.file?.name) this.state.options.page = "";
     this.state.file = { name, base64: toBase64(bytes) };
     this.compiler.open(name, bytes);
