@@ -1,6 +1,7 @@
 //! `[homing]`: refused from an unknown state, homed by switches or by a confirmed pose, switches that fail.
 #![cfg(unix)]
 
+use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Child, Command, Output, Stdio};
@@ -214,7 +215,7 @@ fn impossible_homing_is_an_error_that_names_the_key() {
         fs::write(dir.path().join("wrong.toml"), format!("{toml}\n{homing}")).expect("a file");
         let output = PROGRAM.run(&dir, "machine check wrong.toml");
         assert_eq!(output.status.code(), Some(2), "{homing}: {}", said(&output));
-        all += &format!("{homing}--\n{}\n", stderr(&output));
+        let _ = writeln!(all, "{homing}--\n{}", stderr(&output));
     }
     insta::assert_snapshot!(all);
 }

@@ -1,5 +1,6 @@
 //! Keys of machine files, from the file to what is written: the pen's servo, offsets of pens, backlash.
 
+use std::fmt::Write as _;
 use std::fs;
 
 use compiler::machine_file::PRESETS;
@@ -87,7 +88,7 @@ fn impossible_pens_and_backlash_are_errors_that_name_the_key() {
         machine(&dir, "wrong.toml", "coaxial", from, to);
         let output = PROGRAM.run(&dir, "machine check wrong.toml");
         assert!(!output.status.success(), "{to}: {}", stdout(&output));
-        said += &format!("{to}\n--\n{}\n", test_support::stderr(&output));
+        let _ = writeln!(said, "{to}\n--\n{}", test_support::stderr(&output));
     }
     insta::assert_snapshot!(said);
 }

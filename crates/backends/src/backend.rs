@@ -121,6 +121,19 @@ pub trait Backend: fmt::Debug + Send + Sync {
         None
     }
 
+    /// The program that lifts or lowers the pen where the machine stands, for a plan of rows that rest there.
+    ///
+    /// # Errors
+    /// A backend without sessions or positions.
+    fn pen_program(
+        &self,
+        _plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        _down: bool,
+    ) -> Result<Program, ProgramError> {
+        Err(Unrepresentable::NotSent { format: self.name() }.into())
+    }
+
     /// How the firmware is told to home this machine; `None` where it cannot, and where the machine's
     /// homing is a pose that a person sets.
     fn homing(&self, _machine: &Machine) -> Option<HomingSteps> {

@@ -17,7 +17,7 @@ use clap_complete::Shell;
 
 #[cfg(unix)]
 pub(crate) use device::Emulate;
-pub(crate) use device::{Datum, Flow, PenLift, Send};
+pub(crate) use device::{Datum, Flow, Jog, PenLift, Send};
 pub(crate) use format::Format;
 pub(crate) use ink::{InkColor, with_ink_color};
 pub(crate) use project::{Build, Diff, Init};
@@ -101,6 +101,8 @@ pub(crate) enum Command {
     Calibrate(Calibrate),
     /// Send a plan to a machine
     Send(Send),
+    /// Move a machine by hand: by the commands of a script
+    Jog(Jog),
     /// Make the plans of a project, `plotplan.toml`, that are out of date
     Build(Build),
     /// Write a project file for a folder of drawings
@@ -677,6 +679,7 @@ impl Command {
             Self::Verify(_) => "verify",
             Self::Preview(_) => "preview",
             Self::Send(_) => "send",
+            Self::Jog(_) => "jog",
             Self::Build(_) => "build",
             Self::Init(_) => "init",
             Self::Diff(_) => "diff",

@@ -10,6 +10,7 @@ mod emulate;
 mod firmware_config;
 mod homing;
 mod info;
+mod jog;
 mod machine;
 mod new_machine;
 mod page;
@@ -46,6 +47,7 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
         Command::Tune(tune) => tune::run(tune),
         Command::Calibrate(calibrate) => calibrate::run(calibrate),
         Command::Send(send) => send::run(send),
+        Command::Jog(jog) => jog::run(jog),
         Command::Build(build) => build::run(build),
         Command::Init(init) => build::init(init),
         Command::Diff(diff) => diff::run(diff),

@@ -210,6 +210,46 @@ impl Wire {
         }
     }
 
+    /// Runs a short session to its end without showing its progress. `stops` is called all the time, and may
+    /// end it.
+    pub(crate) fn run_watched(
+        &mut self,
+        session: &mut dyn Session,
+        stops: &mut dyn FnMut() -> bool,
+    ) -> Outcome {
+        let mut stopping = false;
+        loop {
+            if !stopping && (stops() || self.interrupted.is_some()) {
+                stopping = true;
+                session.stop(self.now_us());
+            }
+            let clear = self.port.as_ref().is_some_and(Port::is_clear);
+            if clear {
+                let bytes = session.transmit(self.now_us());
+                self.write(&bytes);
+                if let Some(outcome) = session.outcome() {
+                    return outcome.clone();
+                }
+            }
+            if self.port.is_none() {
+                return failed(session, format!("{} was lost", self.settings.path));
+            }
+            let within = match session.wake_us() {
+                Some(wake_us) if clear => Duration::from_micros(wake_us.saturating_sub(self.now_us())),
+                _ => REOPEN_INTERVAL,
+            };
+            match self.events.next(within.min(REOPEN_INTERVAL)) {
+                Some(Event::Received(bytes)) => {
+                    self.received(&bytes);
+                    session.receive(&bytes, self.now_us());
+                }
+                Some(Event::Lost(number)) if number == self.number => self.lose(),
+                Some(Event::Interrupted) => self.interrupted = Some(now()),
+                Some(Event::Enter | Event::Pause | Event::Lost(_) | Event::Written) | None => {}
+            }
+        }
+    }
+
     /// Runs the session to its end. With `keys` the operator may pause it.
     pub(crate) fn run(&mut self, session: &mut dyn Session, reconnect_s: f64, keys: bool) -> Outcome {
         let progress = SendingProgress::new(session.progress().of_us);

@@ -13,7 +13,7 @@ use crate::backend::{
     Backend, EmulatorOptions, EncodeOptions, InkFrame, PenNumbers, PlanSource, SessionOptions,
 };
 use crate::device::Device;
-use crate::program::{Program, ProgramError, RowEncoder};
+use crate::program::{LineLanguage, Program, ProgramError, RowEncoder};
 use crate::session::Session;
 use crate::status::StatusProtocol;
 use crate::transmission::character_counting::CharacterCounting;
@@ -106,6 +106,18 @@ impl Backend for Ebb {
         encode::write(plan.rows(), moves, pen, out)
     }
 
+    fn pen_program(
+        &self,
+        plan: &PlanSource<'_>,
+        options: &EncodeOptions,
+        down: bool,
+    ) -> Result<Program, ProgramError> {
+        let pen = self.encoder(plan, *options).pen;
+        let ms = plan.header().duration_us / 1000;
+        let line = Line { text: pen.line(down, ms), duration_us: ms * 1000, ..Line::default() };
+        Ok(Program::of_lines(vec![line], Arc::new(PenOnly { lift: pen.line(false, LIFT_MS) })))
+    }
+
     fn session(&self, program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {
         // The board's answers to queries cannot be told from those to lines: one line at a time.
         Some(Box::new(CharacterCounting::new(program, self.status()?, 0)))
@@ -121,6 +133,22 @@ impl Backend for Ebb {
 
     fn ink_frame(&self) -> InkFrame {
         InkFrame::TicksFromStart
+    }
+}
+
+/// The line of a pen move.
+#[derive(Clone, Debug)]
+struct PenOnly {
+    lift: String,
+}
+
+impl LineLanguage for PenOnly {
+    fn lift(&self) -> Vec<String> {
+        vec![self.lift.clone()]
+    }
+
+    fn resume(&self, _done: &[Line]) -> Vec<Line> {
+        Vec::new()
     }
 }
 

@@ -234,6 +234,13 @@ fn decimal(number: f64, decimals: usize) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
+/// The lines that move the pen.
+pub(super) fn pen(options: &Options, down: bool) -> Vec<Line> {
+    let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
+    program.pen(down);
+    program.lines
+}
+
 /// The lines that draw `drawing` (machine mm, in its order), then travel to `park`. `speeds_mm_s` has the speed of each
 /// stroke.
 pub(super) fn paths(drawing: &Drawing, speeds_mm_s: &[f64], park: Point, options: &Options) -> Vec<Line> {

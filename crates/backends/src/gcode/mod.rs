@@ -129,6 +129,17 @@ impl Backend for Paths {
         Ok(program::program(encode::timed(plan.setpoints(self.name())?, &options, false)))
     }
 
+    fn pen_program(
+        &self,
+        plan: &PlanSource<'_>,
+        encode: &EncodeOptions,
+        down: bool,
+    ) -> Result<Program, ProgramError> {
+        let options = options(self.0, self.name(), plan, *encode)?;
+        let lines = encode::pen(&options, down);
+        Ok(program::pen_only(lines, &encode::pen(&options, false)))
+    }
+
     fn parse_program(&self, file: &[u8]) -> Option<Program> {
         let text = String::from_utf8_lossy(file);
         Some(program::parse(&text))

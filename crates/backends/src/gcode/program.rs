@@ -35,6 +35,12 @@ pub(super) fn program(lines: impl IntoIterator<Item = Line>) -> Program {
     Program::of_lines(program, Arc::new(Gcode { lift }))
 }
 
+/// A program that only moves the pen.
+pub(super) fn pen_only(lines: Vec<Line>, lift: &[Line]) -> Program {
+    let lift = lift.iter().map(|line| line.text.clone()).collect();
+    Program::of_lines(lines, Arc::new(Gcode { lift }))
+}
+
 /// A program read from a file; comments and empty lines are left out. A line's row is its number in what is left.
 pub(super) fn parse(text: &str) -> Program {
     let is_code = |line: &&str| !line.split(';').next().unwrap_or_default().trim().is_empty();

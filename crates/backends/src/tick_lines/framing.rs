@@ -130,6 +130,8 @@ fn begun(line: &str) -> StepAnswer {
         // The answer to the first `home` was lost.
         "ok" | "error homing" => StepAnswer::Done,
         text => match text.strip_prefix("error ") {
+            // It is asked again.
+            Some("moving") => StepAnswer::Other,
             Some("no switches") => StepAnswer::Failed("the firmware has no switches to home by".to_owned()),
             Some(why) => StepAnswer::Failed(format!("the machine does not home: {why}")),
             None => StepAnswer::Other,

@@ -80,6 +80,16 @@ impl Backend for Answered {
         program(plan)
     }
 
+    fn pen_program(
+        &self,
+        plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        _down: bool,
+    ) -> Result<Program, ProgramError> {
+        // The rows have the pen.
+        program(plan)
+    }
+
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
         let machine = program.table().map(|table| table.header.machine.clone()).unwrap_or_default();
         let framing = Box::new(framing::TickLineFraming::for_machine(&machine));

@@ -114,6 +114,35 @@ pub(crate) struct Send {
     pub(crate) pen: PenLift,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct Jog {
+    /// Serial device, pseudo-terminal, or tcp:HOST:PORT
+    #[arg(short, long, value_name = "PATH", value_parser = name())]
+    pub(crate) port: String,
+    /// Protocol of the machine; it must report its position: ticks, gcode, ebb
+    #[arg(long, value_enum)]
+    pub(crate) protocol: Protocol,
+    /// The machine
+    #[arg(short, long, value_name = "NAME|FILE.toml", value_parser = name())]
+    pub(crate) machine: String,
+    /// Speed of the port
+    #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
+    pub(crate) baud: u32,
+    /// Commands, one a line; `-` for standard input
+    #[arg(long, value_name = "FILE", value_parser = name())]
+    pub(crate) commands: String,
+    /// Append touches to this file, for calibrate
+    #[arg(long, value_name = "FILE.csv", value_parser = name())]
+    pub(crate) touches: Option<String>,
+    /// Write everything sent and received to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) log: Option<String>,
+    #[command(flatten)]
+    pub(crate) datum: Datum,
+    #[command(flatten)]
+    pub(crate) pen: PenLift,
+}
+
 /// How to talk to a machine: a backend that has a protocol.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Protocol(pub(crate) &'static dyn Backend);
