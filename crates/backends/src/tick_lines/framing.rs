@@ -129,11 +129,10 @@ fn begun(line: &str) -> StepAnswer {
     match unframed(line).unwrap_or(line) {
         // The answer to the first `home` was lost.
         "ok" | "error homing" => StepAnswer::Done,
-        text => match text.strip_prefix("error ") {
-            // It is asked again.
-            Some("moving") => StepAnswer::Other,
+        text => match text.strip_prefix("error ").filter(|why| *why != "moving") {
             Some("no switches") => StepAnswer::Failed("the firmware has no switches to home by".to_owned()),
             Some(why) => StepAnswer::Failed(format!("the machine does not home: {why}")),
+            // A machine that moves is asked again.
             None => StepAnswer::Other,
         },
     }
