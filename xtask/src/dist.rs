@@ -30,15 +30,17 @@ const NATIVE: &str = "x86_64-unknown-linux-musl";
 const MAINTAINER: &str = "The plotplan maintainers <plotplan@users.noreply.example>";
 const FILES: &[&str] = &["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"];
 
-/// Builds what is named, or everything but the studio's files, which are given by their folder.
+/// Builds what is named, or everything but the studio's files, which are given by their folder. With
+/// `--program FILE`, that program is packed instead of building the native one.
 pub(crate) fn run(words: &[&str]) -> Result<bool> {
     let mut targets: Vec<&Target> = Vec::new();
-    let (mut deb, mut wheel, mut studio) = (false, false, None);
+    let (mut deb, mut wheel, mut studio, mut program) = (false, false, None, None);
     let mut rest = words.iter();
     while let Some(word) = rest.next() {
         match *word {
             "--deb" => deb = true,
             "--wheel" => wheel = true,
+            "--program" => program = Some(rest.next().context("--program needs a file")?),
             "--studio" => studio = Some(rest.next().context("--studio needs a folder")?),
             triple => {
                 let known = TARGETS.iter().find(|target| target.triple == triple);
@@ -52,12 +54,17 @@ pub(crate) fn run(words: &[&str]) -> Result<bool> {
     }
     let out = crate::top().join("target/dist");
     std::fs::create_dir_all(&out)?;
-    crate::web::build()?;
-    let native = build(&TARGETS[0])?;
+    let native = if let Some(program) = program {
+        std::path::absolute(program)?
+    } else {
+        crate::web::build()?;
+        build(&TARGETS[0])?
+    };
     let extras = extras(&native, &out)?;
     let mut failed = Vec::new();
     for target in targets {
-        match archive(target, &extras, &out) {
+        let built = if target.triple == NATIVE { Ok(native.clone()) } else { build(target) };
+        match built.and_then(|program| archive(target, &program, &extras, &out)) {
             Ok(file) => println!("{}", file.display()),
             // A system that cannot be built here does not keep the others back.
             Err(error) => failed.push(format!("{}: {error:#}", target.triple)),
@@ -129,8 +136,7 @@ fn extras(program: &Path, out: &Path) -> Result<PathBuf> {
 }
 
 /// One archive: a folder with the program, its man pages, completions, machine files and licences.
-fn archive(target: &Target, extras: &Path, out: &Path) -> Result<PathBuf> {
-    let program = build(target)?;
+fn archive(target: &Target, program: &Path, extras: &Path, out: &Path) -> Result<PathBuf> {
     let name = format!("plotplan-{}-{}", version()?, target.triple);
     let folder = out.join(&name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -139,7 +145,7 @@ fn archive(target: &Target, extras: &Path, out: &Path) -> Result<PathBuf> {
         write(&folder.join(file), std::fs::read(crate::top().join(file))?)?;
     }
     let to = folder.join(program.file_name().context("a name")?);
-    std::fs::copy(&program, &to).with_context(|| format!("{}", program.display()))?;
+    std::fs::copy(program, &to).with_context(|| format!("{}", program.display()))?;
     let packed = pack(out, &name, target.windows)?;
     std::fs::remove_dir_all(&folder)?;
     Ok(packed)

@@ -44,9 +44,10 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bound [PYTHON] [--all]
                 the fastest motion within the tolerance for a set of strokes, with casadi, which is
                 installed below target/; computes what the table of the planner's tests lacks
-  dist [TARGET …] [--deb] [--wheel] [--studio FOLDER]
+  dist [TARGET …] [--deb] [--wheel] [--studio FOLDER] [--program FILE]
                 archives with checksums, man pages and completions below target/dist, for all targets or
-                those named; the Debian package; the wheel; an archive of the studio's static files
+                those named; the Debian package; the wheel; an archive of the studio's static files.
+                FILE is packed as the program of this system instead of building it
   version [X.Y.Z]
                 print the version of all crates, or set it
   site [PROGRAM]

@@ -84,7 +84,8 @@ fn link(top: &Path, source: &Path, page: &Path, target: &str, pages: &[PathBuf])
     } else if !pages.contains(&path) {
         return Ok(format!("{REPOSITORY}{}", path.display()));
     }
-    Ok(target.to_owned())
+    // mdbook makes the index of a folder of its README.
+    Ok(target.replace("README.md", "index.md"))
 }
 
 /// Without `..` and `.`.
@@ -121,7 +122,7 @@ fn reference(program: &Path, source: &Path) -> Result<()> {
     for code in codes.lines().filter_map(|line| line.split_whitespace().next()) {
         let text = printed(&["explain", code])?;
         let (title, body) = text.trim_end().split_once('\n').unwrap_or((text.trim_end(), ""));
-        write!(diagnostics, "\n## {code}\n\n**{}**\n\n{}\n", plain(title), plain(body.trim()))?;
+        write!(diagnostics, "\n## {}\n\n{}\n", plain(title), plain(body.trim()))?;
     }
     write(&source.join("reference/diagnostics.md"), diagnostics)?;
 
