@@ -137,6 +137,10 @@ fn run(dir: &TestDir, page: &str, line: &str) {
     // What reads from a pipe is not ours.
     let line = line.split(" | ").next().unwrap_or_default();
     let mut words: Vec<&str> = line.split_whitespace().skip(1).collect();
+    if words.first() == Some(&"studio") {
+        // It serves until it is ended, and only where the program was built with its files.
+        words.push("--help");
+    }
     if words.first() == Some(&"send") {
         if let Some(at) = words.iter().position(|word| *word == "--port") {
             words.drain(at..at + 2);

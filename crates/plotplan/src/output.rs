@@ -49,10 +49,16 @@ pub(crate) fn write(
     }
     let file = temporary.tempfile_in(folder).map_err(|error| failed(without_path(&error)))?;
     let mut out = BufWriter::with_capacity(1 << 16, file);
-    write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
-    let file = out.into_inner().map_err(|error| failed(error.into_error()))?;
+    write(&mut out).and_then(|()| out.flush()).map_err(|error| failed(with_number(error)))?;
+    let file = out.into_inner().map_err(|error| failed(with_number(error.into_error())))?;
     file.persist(path).map_err(|error| failed(error.error))?;
     Ok(())
+}
+
+/// The system's own error, where there is one; errors of writers stay as they are.
+fn with_number(error: std::io::Error) -> std::io::Error {
+    let plain = without_path(&error);
+    if plain.raw_os_error().is_some() { plain } else { error }
 }
 
 /// The system's own error: the text around it names the temporary file.
