@@ -101,9 +101,8 @@ export class Viewer {
     this.picture = new Picture(this.canvases, meta, this.rows, this.predicted, this.picture ?? null);
     this.scrubber.show(this.rows, (number) => this.picture.pens.get(number)?.color ?? "#000000", this.end);
     if (!isDraft) {
-      this.strips?.remove();
-      this.strips = null;
-      // The picture first: speeds and strips follow when it is on the screen.
+      // The picture first: speeds and strips follow when it is on the screen. Those of the plan before stay
+      // until then, so that the page keeps its layout.
       const { rows } = this;
       requestAnimationFrame(() => setTimeout(() => rows === this.rows && this.addMotion(), 0));
     }
@@ -112,6 +111,8 @@ export class Viewer {
   }
 
   addMotion() {
+    this.strips?.remove();
+    this.strips = null;
     // A machine that stands has no motion.
     if (this.rows.t.length > 1) this.showMotion();
     document.documentElement.dataset.ready = "true";
