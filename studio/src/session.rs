@@ -288,7 +288,12 @@ impl Studio {
     }
 
     fn view(&self, planned: &Planned) -> Reply {
-        let (meta, columns) = self.view_of(planned).data_into(Columns::quick());
+        let mut view = self.view_of(planned);
+        if planned.job.draft {
+            // The distance of each row from the drawing, and the bytes of each stroke, come with the full plan.
+            view.drawing = None;
+        }
+        let (meta, columns) = view.data_into(Columns::quick());
         let ink = planned.placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
             "meta": meta,

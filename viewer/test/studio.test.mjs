@@ -179,7 +179,6 @@ test("messages about the machine file stand at their line", () => onStudio({}, a
 test("the drawing is moved, scaled and turned by hand", () => onStudio({}, async (page) => {
   await planned(page, () => page.click("#example"));
   await page.click("#tab-place");
-  await page.selectOption("#mirror", "");
   await planned(page, async () => {
     await page.fill("#scale", "50");
     await page.locator("#scale").blur();
