@@ -9,11 +9,14 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 
-/// Time limit of one run.
+/// Limit of one run's CPU time, which the load of the machine does not change.
 const LIMIT: Duration = Duration::from_secs(10);
 
 /// Additional time for each kilometre of ink: a plan of six kilometres takes two days to draw.
 const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(30);
+
+/// A run may wait this many times longer than it may compute.
+const WAIT: u32 = 4;
 const MACHINES: [&str; 2] = ["coaxial", "polar"];
 const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 
@@ -22,11 +25,12 @@ const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 struct Run {
     /// `None` if it was stopped at the time limit.
     exit: Option<i32>,
+    /// CPU time where the system reports it, otherwise the time it took, s.
+    seconds: f64,
     stderr: String,
     stdout: String,
     /// Whether it left an output file.
     wrote: bool,
-    seconds: f64,
 }
 
 /// Prints a table and a summary; true if no run failed.
@@ -161,11 +165,13 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Du
         .stderr(std::fs::File::create(&stderr)?)
         .spawn()
         .context("cannot start the binary")?;
+    let mut used = Duration::ZERO;
     let status = loop {
         if let Some(status) = child.try_wait()? {
             break Some(status);
         }
-        if began.elapsed() > limit {
+        used = cpu_time(child.id()).unwrap_or_else(|| began.elapsed());
+        if used > limit || began.elapsed() > limit * WAIT {
             child.kill()?;
             child.wait()?;
             break None;
@@ -178,8 +184,18 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Du
         stderr: String::from_utf8_lossy(&std::fs::read(&stderr)?).into_owned(),
         stdout: String::from_utf8_lossy(&std::fs::read(&stdout)?).into_owned(),
         wrote: output.exists(),
-        seconds: began.elapsed().as_secs_f64(),
+        seconds: used.as_secs_f64(),
     })
+}
+
+/// CPU time that a process has used, by Linux's `/proc/PID/stat`: fields 14 and 15, user and system
+/// time in hundredths of a second (proc_pid_stat(5); `USER_HZ` is 100 on all its architectures).
+fn cpu_time(process: u32) -> Option<Duration> {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The name of the program, field 2, is in parentheses and may contain blanks.
+    let fields: Vec<&str> = stat.rsplit_once(") ")?.1.split(' ').collect();
+    let hundredths: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+    Some(Duration::from_millis(10 * hundredths))
 }
 
 /// A fault that no run may have, whatever its arguments.

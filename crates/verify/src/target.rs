@@ -113,29 +113,29 @@ pub(crate) struct PenTarget {
     /// In the order of the strokes, and within a stroke along it.
     pub(crate) pieces: Vec<Piece>,
     all: BoxTree,
-    /// The first and last pieces of the strokes.
-    ends: BoxTree,
+    /// Where strokes begin and end, with their first or last piece.
+    ends: Vec<(Point, u32)>,
+    ends_tree: BoxTree,
 }
 
-/// A bounding box tree of some pieces.
+/// A bounding box tree of items that are numbered from 0.
 #[derive(Clone, Debug)]
 struct BoxTree {
-    /// Their indices by location, see [`by_position`].
+    /// The items by location, see [`by_position`].
     order: Vec<u32>,
-    /// `levels[0][i]` bounds the pieces `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the
+    /// `levels[0][i]` bounds the items `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the
     /// boxes of `levels[k]` likewise; the last level is one box.
     levels: Vec<Vec<Rect>>,
 }
 
 impl BoxTree {
-    /// Of at least one piece.
-    fn new(pieces: &[Piece], of: Vec<u32>) -> Self {
-        let order = by_position(pieces, of);
+    /// Of at least one item.
+    fn new(boxes: &[Rect]) -> Self {
+        let order = by_position(boxes);
         let mut levels: Vec<Vec<Rect>> = Vec::new();
         let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
-        let bounds = |chunk: &[u32]| chunk.iter().map(|i| pieces[*i as usize].bounds()).collect::<Vec<_>>();
-        let leaves: Vec<Rect> = order.chunks(FAN).map(|chunk| union(&bounds(chunk))).collect();
-        let mut level = leaves;
+        let bounds = |chunk: &[u32]| chunk.iter().map(|i| boxes[*i as usize]).collect::<Vec<_>>();
+        let mut level: Vec<Rect> = order.chunks(FAN).map(|chunk| union(&bounds(chunk))).collect();
         while level.len() > 1 {
             let next = level.chunks(FAN).map(union).collect();
             levels.push(std::mem::replace(&mut level, next));
@@ -144,7 +144,8 @@ impl BoxTree {
         Self { order, levels }
     }
 
-    fn visit(&self, pieces: &[Piece], bounds: Rect, mut to: impl FnMut(u32, Rect)) {
+    /// Calls `to` with every item of a lowest box that meets `bounds`.
+    fn visit(&self, bounds: Rect, mut to: impl FnMut(u32)) {
         let mut open = vec![(self.levels.len() - 1, 0)];
         while let Some((level, index)) = open.pop() {
             if !meet(self.levels[level][index], bounds) {
@@ -156,12 +157,7 @@ impl BoxTree {
                     children.take_while(|i| *i < self.levels[level - 1].len()).map(|i| (level - 1, i)),
                 );
             } else {
-                for &i in &self.order[children.start..children.end.min(self.order.len())] {
-                    let piece = pieces[i as usize].bounds();
-                    if meet(piece, bounds) {
-                        to(i, piece);
-                    }
-                }
+                self.order[children.start..children.end.min(self.order.len())].iter().for_each(|i| to(*i));
             }
         }
     }
@@ -169,24 +165,49 @@ impl BoxTree {
 
 impl PenTarget {
     fn new(pen: u16, pieces: Vec<Piece>) -> Self {
-        let all = BoxTree::new(&pieces, (0..pieces.len() as u32).collect());
+        let all = BoxTree::new(&pieces.iter().map(Piece::bounds).collect::<Vec<_>>());
         let stroke = |index: usize| pieces.get(index).map(|piece| piece.stroke);
-        let is_end = |index: &u32| {
-            let index = *index as usize;
-            index == 0 || stroke(index - 1) != stroke(index) || stroke(index) != stroke(index + 1)
-        };
-        let ends = BoxTree::new(&pieces, (0..pieces.len() as u32).filter(is_end).collect());
-        Self { pen, pieces, all, ends }
+        let mut ends = Vec::new();
+        for (index, piece) in pieces.iter().enumerate() {
+            if index == 0 || stroke(index - 1) != stroke(index) {
+                ends.push((piece.start, index as u32));
+            }
+            if stroke(index) != stroke(index + 1) {
+                ends.push((piece.at(piece.length), index as u32));
+            }
+        }
+        let ends_tree =
+            BoxTree::new(&ends.iter().map(|(end, _)| Rect::from_points(*end, *end)).collect::<Vec<_>>());
+        Self { pen, pieces, all, ends, ends_tree }
     }
 
     /// Calls `to` with the index and bounding box of every piece whose box meets `bounds`.
-    pub(crate) fn visit(&self, bounds: Rect, to: impl FnMut(u32, Rect)) {
-        self.all.visit(&self.pieces, bounds, to);
+    pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32, Rect)) {
+        self.all.visit(bounds, |index| {
+            let piece = self.pieces[index as usize].bounds();
+            if meet(piece, bounds) {
+                to(index, piece);
+            }
+        });
     }
 
-    /// The same for the first and last pieces of strokes only.
-    pub(crate) fn visit_ends(&self, bounds: Rect, to: impl FnMut(u32, Rect)) {
-        self.ends.visit(&self.pieces, bounds, to);
+    /// Calls `to` with the first or last piece of every stroke that begins or ends in `bounds`.
+    pub(crate) fn visit_ends(&self, bounds: Rect, mut to: impl FnMut(u32)) {
+        self.ends_tree.visit(bounds, |end| {
+            let (point, piece) = self.ends[end as usize];
+            if bounds.contains(point) {
+                to(piece);
+            }
+        });
+    }
+
+    /// Where the stroke of this piece begins, if this is its first piece, and ends, if it is the last.
+    pub(crate) fn ends_of(&self, index: u32) -> [Option<Point>; 2] {
+        let index = index as usize;
+        let piece = &self.pieces[index];
+        let other = |index: usize| self.pieces.get(index).is_none_or(|other| other.stroke != piece.stroke);
+        let first = index == 0 || other(index - 1);
+        [first.then_some(piece.start), other(index + 1).then(|| piece.at(piece.length))]
     }
 
     /// The nearest piece to `p` and its distance, by branch and bound.
@@ -220,10 +241,11 @@ impl PenTarget {
     }
 }
 
-/// The indices of some pieces along a Morton (Z-order) curve through their midpoints, so that
-/// neighbours share boxes.
-fn by_position(pieces: &[Piece], mut order: Vec<u32>) -> Vec<u32> {
-    let Some(all) = pieces.iter().map(Piece::bounds).reduce(|a, b| a.union(b)) else { return order };
+/// The items along a Morton (Z-order) curve through the middles of their boxes, so that neighbours
+/// share boxes.
+fn by_position(boxes: &[Rect]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    let Some(all) = boxes.iter().copied().reduce(|a, b| a.union(b)) else { return order };
     let scale = 65535.0 / all.width().max(all.height()).max(f64::MIN_POSITIVE);
     let spread = |value: f64| {
         let mut bits = u64::from(value as u16);
@@ -233,8 +255,7 @@ fn by_position(pieces: &[Piece], mut order: Vec<u32>) -> Vec<u32> {
         (bits | bits << 1) & 0x5555_5555
     };
     order.sort_by_cached_key(|i| {
-        let piece = &pieces[*i as usize];
-        let middle = piece.at(0.5 * piece.length);
+        let middle = boxes[*i as usize].center();
         spread((middle.x - all.x0) * scale) | spread((middle.y - all.y0) * scale) << 1
     });
     order
