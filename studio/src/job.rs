@@ -272,6 +272,7 @@ impl Job {
             tolerance_mm: parsed("tolerance", &options.tolerance, option::length)?.unwrap_or(TOLERANCE_MM),
             period_us: (period_s * 1e6).round().max(0.0) as u64,
             order: options.order(true)?,
+            search: None,
             crop: None,
             placement: options.placement()?,
             pen_speeds,

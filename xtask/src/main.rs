@@ -65,6 +65,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bench rounding [DIR]
                 ink of whole ticks along the path and of the nearest ticks, on the examples and the
                 drawings in DIR: distances from the exact path, CPU time
+  bench place   what the search for the best place gains on the examples
   bench simulate
       speed of simulations and of a search of gains
   bench plan [PYTHON]
@@ -106,6 +107,7 @@ fn main() -> ExitCode {
         ["bench", "read-once", file] => bench::read_once(file.as_ref()),
         ["bench", "rounding"] => bench::rounding(None),
         ["bench", "rounding", folder] => bench::rounding(Some(folder.as_ref())),
+        ["bench", "place"] => bench::place(),
         ["bench", "simulate"] => bench::simulate(),
         ["bench", "plan"] => bench::plan("python3"),
         ["bench", "plan", python] => bench::plan(python),

@@ -33,6 +33,7 @@ fn digest(bytes: &[u8], machine: &str) -> Result<String, Box<dyn Error>> {
         period_us: 10_000,
         order: Order::Optimize(ordering::Options::default()),
         placement: PlacementOptions { scale: Scale::Fit, ..PlacementOptions::default() },
+        search: None,
         crop: None,
         pen_speeds: Vec::new(),
         pen_colors: BTreeMap::new(),

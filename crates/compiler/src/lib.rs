@@ -20,6 +20,7 @@
 //!     period_us: 10_000,
 //!     order: Order::Optimize(ordering::Options::default()),
 //!     placement: PlacementOptions::default(),
+//!     search: None,
 //!     crop: None,
 //!     pen_speeds: Vec::new(),
 //!     pen_colors: std::collections::BTreeMap::new(),
@@ -38,6 +39,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod best_place;
 pub mod calibrate;
 pub mod diff;
 pub mod import;

@@ -10,6 +10,7 @@ use plan::{Header, Limits, Motor, Rounding};
 use planner::{PlacementOptions, PlanError, Settings, Surface, TimingLaw, Trajectory};
 use verify::Certificate;
 
+use crate::best_place::{BestPlace, Search, best_place};
 use crate::layout::{Crop, cropped};
 use crate::replay::{on_carriage, on_paper};
 use crate::restart;
@@ -46,6 +47,8 @@ pub struct Request {
     pub order: Order,
     /// Placement of the drawing on the machine.
     pub placement: PlacementOptions,
+    /// The search for the best position, and turn, at the scale and reflection of `placement`.
+    pub search: Option<Search>,
     /// What is kept of the placed drawing; all if `None`.
     pub crop: Option<Crop>,
     /// Drawing speeds of single pens, mm/s; the machine's own limit still holds.
@@ -86,6 +89,8 @@ pub struct Compiled<'a> {
     pub header: Header,
     /// From drawing mm to machine mm.
     pub placement: Affine,
+    /// The best placement, if one was searched for.
+    pub best_place: Option<BestPlace>,
     /// The placed drawing in the file's order; machine mm.
     pub placed: Drawing,
     /// How far ink reaches beyond the sheet, mm.
@@ -311,8 +316,12 @@ pub fn compile<'a>(
     progress: &dyn Fn(Step),
 ) -> Result<Compiled<'a>, PlanError> {
     progress(Step::Placing);
+    let duration = |placed: Drawing| duration_of(placed, machine, request);
+    let search = |search| best_place(drawing, machine, &request.placement, search, &duration);
+    let best_place = request.search.map(search).transpose()?;
+    let options = best_place.map_or(request.placement, |best| best.options);
     let Placed { placement, drawing: placed, beyond_sheet_mm } =
-        place(drawing, machine, &request.placement, request.crop)?;
+        place(drawing, machine, &options, request.crop)?;
 
     let (ordered, ordering) = match &request.order {
         Order::File => (placed.clone(), None),
@@ -337,7 +346,40 @@ pub fn compile<'a>(
             Planned { trajectory, header, certificate } = other;
         }
     }
-    Ok(Compiled { trajectory, header, placement, placed, beyond_sheet_mm, ordering, strokes, certificate })
+    Ok(Compiled {
+        trajectory,
+        header,
+        placement,
+        best_place,
+        placed,
+        beyond_sheet_mm,
+        ordering,
+        strokes,
+        certificate,
+    })
+}
+
+/// The duration of the plan of a placed drawing, s; `None` if it cannot be planned.
+fn duration_of(placed: Drawing, machine: &Machine, request: &Request) -> Option<f64> {
+    let placed = cropped(placed, request.crop, machine.sheet());
+    let ordered = match &request.order {
+        Order::File => placed,
+        Order::Optimize(options) => by_travel_time(placed, machine, options, &|_| {}).0,
+    };
+    let trajectory = plan(machine, ordered, &planner_settings(request), &|_| {}).ok()?;
+    Some(trajectory.duration_us() as f64 * 1e-6)
+}
+
+/// The planner's settings of a request.
+fn planner_settings(request: &Request) -> Settings {
+    Settings {
+        pen_speeds_mm_s: request.pen_speeds.clone(),
+        timing_law: request.timing_law,
+        joint_fit: request.joint_fit,
+        lift_overlap_s: request.lift_overlap_s,
+        rounding: request.rounding,
+        ..Settings::new(request.tolerance_mm, request.period_us)
+    }
 }
 
 /// A plan and its certificate.
@@ -357,15 +399,7 @@ fn planned<'a>(
     progress: &dyn Fn(Step),
 ) -> Result<Planned<'a>, PlanError> {
     progress(Step::Planning(0, ordered.strokes.len()));
-    let settings = Settings {
-        pen_speeds_mm_s: request.pen_speeds.clone(),
-        timing_law: request.timing_law,
-        joint_fit: request.joint_fit,
-        lift_overlap_s: request.lift_overlap_s,
-        rounding: request.rounding,
-        ..Settings::new(request.tolerance_mm, request.period_us)
-    };
-    let trajectory = plan(machine, ordered, &settings, progress)?;
+    let trajectory = plan(machine, ordered, &planner_settings(request), progress)?;
     let ordered = trajectory.drawing();
 
     let header = Header {

@@ -45,6 +45,7 @@ fn request(timing_law: TimingLaw) -> Request {
         period_us: 10_000,
         order: Order::Optimize(ordering::Options::default()),
         placement: PlacementOptions { scale: Scale::Fit, ..PlacementOptions::default() },
+        search: None,
         crop: None,
         pen_speeds: Vec::new(),
         pen_colors: BTreeMap::new(),

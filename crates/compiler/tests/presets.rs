@@ -66,6 +66,7 @@ fn plans_over_the_sheet_are_certified() {
                 scale: Scale::Explicit { factor: size, origin_mm: Vec2::ZERO },
                 ..PlacementOptions::default()
             },
+            search: None,
             crop: None,
             pen_speeds: Vec::new(),
             pen_colors: std::collections::BTreeMap::new(),

@@ -41,6 +41,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         period_us: 10_000,
         order: Order::File,
         placement: PlacementOptions { scale, ..PlacementOptions::default() },
+        search: None,
         crop: None,
         pen_speeds: Vec::new(),
         pen_colors: std::collections::BTreeMap::new(),

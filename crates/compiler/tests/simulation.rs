@@ -38,6 +38,7 @@ impl Zot {
             period_us: 10_000,
             order: Order::Optimize(ordering::Options::default()),
             placement: PlacementOptions::default(),
+            search: None,
             crop: None,
             pen_speeds: Vec::new(),
             pen_colors: std::collections::BTreeMap::new(),

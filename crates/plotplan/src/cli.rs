@@ -267,9 +267,13 @@ pub(crate) struct Placement {
     /// Align the ink with the sheet less its margin: center, left, right, top, bottom, top-left, ...
     #[arg(long, value_name = "WHERE", conflicts_with = "place", value_parser = align)]
     pub(crate) align: Option<(f64, f64)>,
-    /// Move the drawing's origin to X,Y from the sheet's lower-left corner
-    #[arg(long, value_name = "X,Y", value_parser = place, allow_hyphen_values = true)]
-    pub(crate) place: Option<(f64, f64)>,
+    /// Move the drawing's origin to X,Y from the sheet's lower-left corner; or find the best position, and turn unless
+    /// --rotate is given
+    #[arg(long, value_name = "X,Y|best", value_parser = place, allow_hyphen_values = true)]
+    pub(crate) place: Option<Place>,
+    /// With --place best: what it is best for
+    #[arg(id = "for", long, value_enum, default_value_t = BestFor::Time)]
+    pub(crate) best_for: BestFor,
     /// Scale the drawing about its origin: 0.5 or 50%
     #[arg(long, value_name = "FACTOR|PERCENT%", value_parser = scale, allow_negative_numbers = true)]
     pub(crate) scale: Option<f64>,
@@ -282,6 +286,24 @@ pub(crate) struct Placement {
     /// Distance that --fit, --shrink and --align keep from the edges of the sheet
     #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = length, allow_hyphen_values = true)]
     pub(crate) margin: f64,
+}
+
+/// The position of a drawing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Place {
+    /// Its origin from the sheet's lower-left corner, mm.
+    At(f64, f64),
+    /// The best one.
+    Best,
+}
+
+/// What a position is best for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BestFor {
+    /// The shortest plan
+    Time,
+    /// The finest resolution: the least of the largest quantization errors along the ink
+    Accuracy,
 }
 
 /// A reflection.

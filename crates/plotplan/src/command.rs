@@ -23,6 +23,7 @@ mod verify;
 
 use backends::pen_plotter::plotter;
 use clap::CommandFactory as _;
+use compiler::best_place::{BestFor, Search};
 use compiler::import::{self, Page, PenSettings};
 use compiler::layout::Crop;
 use compiler::pipeline::{Order, Request};
@@ -140,6 +141,7 @@ fn request(planning: &Planning, crop: Option<Crop>, page: &Page, machine: &Machi
         order: order(planning),
         crop,
         placement: placement(&planning.placement),
+        search: search(&planning.placement),
         pen_speeds,
         pen_colors: compiler::scene::pen_colors(page),
         // The pen is off the paper long before it is all the way up.
@@ -177,8 +179,11 @@ fn placement(options: &cli::Placement) -> PlacementOptions {
     } else if let Some((x, y)) = options.align {
         Scale::Aligned { factor: options.scale.unwrap_or(1.0), align: Vec2::new(x, y) }
     } else {
-        let (x, y) = options.place.unwrap_or((0.0, 0.0));
-        Scale::Explicit { factor: options.scale.unwrap_or(1.0), origin_mm: Vec2::new(x, y) }
+        let origin_mm = match options.place {
+            Some(cli::Place::At(x, y)) => Vec2::new(x, y),
+            Some(cli::Place::Best) | None => Vec2::ZERO,
+        };
+        Scale::Explicit { factor: options.scale.unwrap_or(1.0), origin_mm }
     };
     PlacementOptions {
         mirror: options.mirror.map(|mirror| match mirror {
@@ -189,6 +194,15 @@ fn placement(options: &cli::Placement) -> PlacementOptions {
         scale,
         margin_mm: options.margin,
     }
+}
+
+/// The search for the best placement, if the options ask for it.
+fn search(options: &cli::Placement) -> Option<Search> {
+    let aim = match options.best_for {
+        cli::BestFor::Time => BestFor::Time,
+        cli::BestFor::Accuracy => BestFor::Accuracy,
+    };
+    (options.place == Some(cli::Place::Best)).then_some(Search { aim, turns: options.rotate.is_none() })
 }
 
 /// The timing law that the options ask for.

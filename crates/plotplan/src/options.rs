@@ -28,7 +28,8 @@ const PLANNING: [&str; 13] = [
 const MOTION: [&str; 8] =
     ["tolerance", "period", "speed", "overlap_lifts", "law", "segment_time", "rounding", "allow_over_limit"];
 /// Options of placement.
-const PLACEMENT: [&str; 8] = ["fit", "shrink", "align", "place", "scale", "rotate", "mirror", "margin"];
+const PLACEMENT: [&str; 9] =
+    ["fit", "shrink", "align", "place", "for", "scale", "rotate", "mirror", "margin"];
 /// Options of placement that need a sheet.
 const ON_SHEET: [&str; 3] = ["fit", "shrink", "align"];
 /// Options of the ordering that `--order file` leaves out; `--effort 0` has an effect on paths too.
@@ -71,6 +72,7 @@ pub(crate) fn without_effect(matches: &ArgMatches) -> Option<String> {
         _ => None,
     };
     of_command
+        .or_else(|| best_place(&options, command))
         .or_else(|| options.refuse(&["gap"], "without --copies").filter(|_| !options.has("copies")))
         .or_else(|| {
             let is_outlines = options.text("text") == "outlines";
@@ -131,13 +133,18 @@ impl Given<'_> {
     }
 }
 
-fn convert(options: &Given<'_>) -> Option<String> {
-    let format = match options.text("format") {
+/// The format of `convert`, by name or by the output's extension.
+fn format_of(options: &Given<'_>) -> String {
+    match options.text("format") {
         given if given.is_empty() => {
             Format::of_extension(&options.text("output")).unwrap_or_default().name().to_owned()
         }
         given => given,
-    };
+    }
+}
+
+fn convert(options: &Given<'_>) -> Option<String> {
+    let format = format_of(options);
     if format == "hpgl" || format == "svg" {
         let why = format!("with --format {format}");
         let no_motion = format!("{why}: it holds no motion");
@@ -209,8 +216,23 @@ fn tune(options: &Given<'_>) -> Option<String> {
 
 /// `--margin` is for placements that look at the sheet's edges.
 fn margin(options: &Given<'_>) -> Option<String> {
-    let has_margin = ON_SHEET.iter().any(|id| options.has(id));
-    options.refuse(&["margin"], "without --fit, --shrink or --align").filter(|_| !has_margin)
+    let has_margin = ON_SHEET.iter().any(|id| options.has(id)) || options.text("place") == "best";
+    options.refuse(&["margin"], "without --fit, --shrink, --align or --place best").filter(|_| !has_margin)
+}
+
+/// `--place best` compares plans: it needs a command that makes one.
+fn best_place(options: &Given<'_>, command: &str) -> Option<String> {
+    if options.text("place") != "best" {
+        return options.refuse(&["for"], "without --place best");
+    }
+    let plans = match command {
+        "convert" => !["hpgl", "svg"].contains(&format_of(options).as_str()),
+        "preview" => is_page(options) || MOVING.iter().any(|id| options.has(id)),
+        "info" => options.has("machine"),
+        "check" => false,
+        _ => true,
+    };
+    (!plans).then(|| "--place best has no effect without a plan".to_owned())
 }
 
 /// Options that need a sheet, where no machine and no paper gives one.
@@ -269,7 +291,7 @@ mod tests {
     use crate::cli::Arguments;
 
     /// Each option with a value that it takes.
-    const VALUES: [(&str, Option<&str>); 41] = [
+    const VALUES: [(&str, Option<&str>); 43] = [
         ("--color-by", Some("speed")),
         ("--at", Some("2s")),
         ("--animate", Some("9s")),
@@ -290,6 +312,8 @@ mod tests {
         ("--shrink", None),
         ("--align", Some("center")),
         ("--place", Some("1,1")),
+        ("--place", Some("best")),
+        ("--for", Some("time")),
         ("--scale", Some("2")),
         ("--rotate", Some("90")),
         ("--mirror", Some("x")),

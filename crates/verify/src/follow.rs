@@ -198,9 +198,9 @@ mod tests {
 
     /// The strokes followed by a pen that moves along x from (0, 0) to `end`, after the last step.
     fn followed_at(end: f64, lines: &[[(f64, f64); 2]]) -> Vec<u32> {
-        let strokes = lines.iter().filter_map(|line| {
-            Stroke::polyline(Pen(1), line.map(Point::from).to_vec(), Span::default())
-        });
+        let strokes = lines
+            .iter()
+            .filter_map(|line| Stroke::polyline(Pen(1), line.map(Point::from).to_vec(), Span::default()));
         let strokes = Target::new(&Drawing { strokes: strokes.collect() }, 0.1).pens.remove(0);
         let mut follower = Follower::default();
         let mut candidates: Vec<(f64, u32)> = (0..strokes.pieces.len() as u32).map(|i| (0.0, i)).collect();

@@ -1,18 +1,22 @@
 //! Benchmarks: figures beside those of peers, by CPU time.
 
 mod inputs;
+mod place;
 mod plan;
 mod read;
 mod rounding;
 mod simulate;
 mod workload;
 
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
+use compiler::pipeline::{Order, Request};
+use planner::{PlacementOptions, TimingLaw};
 
 pub(crate) use read::once as read_once;
 
@@ -30,6 +34,14 @@ pub(crate) fn simulate() -> Result<bool> {
         return released(&["simulate".as_ref()]);
     }
     simulate::run()
+}
+
+/// `bench place`; true if all goals were met.
+pub(crate) fn place() -> Result<bool> {
+    if cfg!(debug_assertions) {
+        return released(&["place".as_ref()]);
+    }
+    place::run()
 }
 
 /// `bench rounding`; true if all goals were met.
@@ -57,6 +69,25 @@ fn released(arguments: &[&OsStr]) -> Result<bool> {
     let mut again = Command::new(env!("CARGO"));
     again.args(["run", "--quiet", "--release", "--package", "xtask", "--", "bench"]).args(arguments);
     Ok(again.current_dir(crate::top()).status().context("cargo run --release")?.success())
+}
+
+/// The settings of the program's own defaults.
+fn request() -> Request {
+    Request {
+        tolerance_mm: 0.1,
+        period_us: 10_000,
+        order: Order::Optimize(ordering::Options::default()),
+        placement: PlacementOptions::default(),
+        search: None,
+        crop: None,
+        pen_speeds: Vec::new(),
+        pen_colors: BTreeMap::new(),
+        lift_overlap_s: 0.0,
+        timing_law: TimingLaw::TimeOptimal,
+        rounding: planner::Rounding::Path,
+        joint_fit: true,
+        allow_over_limit: false,
+    }
 }
 
 /// What `work` gives, and the CPU time that it takes, s: the least of three rounds, because other programs on this

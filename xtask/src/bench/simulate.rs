@@ -1,19 +1,16 @@
 //! `cargo xtask bench simulate`: speed of simulations and of a search of gains, on examples/zot.hpgl
 //! and the coaxial arm.
 
-use std::collections::BTreeMap;
-
 use anyhow::{Context as _, Result};
 use compiler::machine_file::{MachineFile, PRESETS};
-use compiler::pipeline::{self, Order, Request};
+use compiler::pipeline;
 use compiler::simulate::{Plan, simulate};
 use compiler::{import, tune};
 use drawing::Drawing;
 use kinematics::Machine;
 use plan::Row;
-use planner::{PlacementOptions, TimingLaw};
 
-use super::{Clock, fastest};
+use super::{Clock, fastest, request};
 
 /// Times real time that a simulation should reach, on one core.
 const TIMES_REAL: f64 = 200.0;
@@ -24,21 +21,7 @@ const TUNE_S: f64 = 20.0;
 fn planned(machine: &Machine) -> Result<(Vec<Row>, Drawing)> {
     let bytes = std::fs::read(crate::top().join("examples/zot.hpgl")).context("examples/zot.hpgl")?;
     let document = import::read(&bytes, &import::Options::default())?;
-    let request = Request {
-        tolerance_mm: 0.1,
-        period_us: 10_000,
-        order: Order::Optimize(ordering::Options::default()),
-        placement: PlacementOptions::default(),
-        crop: None,
-        pen_speeds: Vec::new(),
-        pen_colors: BTreeMap::new(),
-        lift_overlap_s: 0.0,
-        timing_law: TimingLaw::TimeOptimal,
-        rounding: planner::Rounding::Path,
-        joint_fit: true,
-        allow_over_limit: false,
-    };
-    let compiled = pipeline::compile(&document.pages[0].drawing, machine, &request, &|_| {})?;
+    let compiled = pipeline::compile(&document.pages[0].drawing, machine, &request(), &|_| {})?;
     let rows = compiled.trajectory.rows().map(|row| row.row).collect();
     Ok((rows, compiled.ordered().clone()))
 }

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::round;
 use super::text;
+use crate::best_place::BestPlace;
 use crate::pipeline::Compiled;
 
 /// The summary of a plan.
@@ -49,10 +50,48 @@ pub struct Summary {
     /// Coefficients `a b c d e f` of the map from drawing mm to machine mm: `x' = a x + c y + e`,
     /// `y' = b x + d y + f`.
     pub placement: [f64; 6],
+    /// The best placement, if one was searched for (`--place best`).
+    pub best_place: Option<BestPlaceReport>,
     /// Pen changes in the order drawn.
     pub pen_changes: usize,
     /// What ordering gained; `null` for the file's order.
     pub ordering: Option<Ordering>,
+}
+
+/// The result of the search for the best placement.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct BestPlaceReport {
+    /// `time` or `accuracy`.
+    pub best_for: &'static str,
+    /// The drawing's origin from the sheet's lower left corner, mm (`--place`).
+    pub place_mm: [f64; 2],
+    /// Counterclockwise rotation, degrees (`--rotate`).
+    pub rotate_deg: f64,
+    /// For `time` the duration, s; for `accuracy` the largest quantization error along the ink (half a
+    /// tick of both motors), mm.
+    pub figure: f64,
+    /// The same of the drawing in the middle of the sheet without a turn; `null` where the machine cannot
+    /// draw it there.
+    pub figure_centered: Option<f64>,
+    /// Placements that were compared.
+    pub compared: usize,
+}
+
+impl BestPlaceReport {
+    pub(super) fn of(best: &BestPlace) -> Self {
+        let origin = match best.options.scale {
+            planner::Scale::Explicit { origin_mm, .. } => origin_mm,
+            _ => drawing::Vec2::ZERO,
+        };
+        Self {
+            best_for: best.aim.name(),
+            place_mm: [round::mm(origin.x), round::mm(origin.y)],
+            rotate_deg: round::mm(best.options.rotate_rad.to_degrees()),
+            figure: round::s(best.figure),
+            figure_centered: best.centered.map(round::s),
+            compared: best.compared,
+        }
+    }
 }
 
 /// What ordering gained.
@@ -103,6 +142,7 @@ impl Summary {
             blended_strokes: compiled.trajectory.blended_strokes(),
             pen_up_share: round::share((times.travel_s + times.lifting_s) / duration_s),
             placement: compiled.placement.as_coeffs().map(round::coefficient),
+            best_place: compiled.best_place.as_ref().map(BestPlaceReport::of),
             pen_changes: text::pen_changes(compiled.ordered()),
             ordering: compiled.ordering.as_ref().map(|report| Ordering::of(report, true)),
         }

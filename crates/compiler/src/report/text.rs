@@ -7,6 +7,8 @@ use kinematics::Machine;
 use plan::Rounding;
 use verify::{Certificate, Deviation, DeviationStats};
 
+use super::summary::BestPlaceReport;
+use crate::best_place::{BestFor, BestPlace};
 use crate::pipeline::Compiled;
 
 /// The summary of a plan.
@@ -29,6 +31,9 @@ pub fn summary(machine: &Machine, compiled: &Compiled<'_>) -> String {
     let scale = libm::hypot(a, b);
     if (scale - 1.0).abs() > 1e-12 {
         let _ = write!(text, ", scaled by {scale:.4}");
+    }
+    if let Some(best) = &compiled.best_place {
+        text.push_str(&best_place(best));
     }
     let _ = writeln!(
         text,
@@ -56,6 +61,31 @@ pub fn summary(machine: &Machine, compiled: &Compiled<'_>) -> String {
         );
     }
     text
+}
+
+/// Where the search put the drawing, and what that gained.
+fn best_place(best: &BestPlace) -> String {
+    let report = BestPlaceReport::of(best);
+    let [x, y] = report.place_mm;
+    let (aim, unit) = match best.aim {
+        BestFor::Time => ("the shortest time", " s"),
+        BestFor::Accuracy => ("the finest resolution", " mm"),
+    };
+    let gain = match best.centered {
+        Some(centered) => {
+            let change = 100.0 * (best.figure / centered - 1.0);
+            format!(
+                "{:.3}{unit}, {change:+.1} % of {centered:.3}{unit} in the middle of the sheet",
+                best.figure
+            )
+        }
+        None => format!("{:.3}{unit}; in the middle of the sheet it cannot be drawn", best.figure),
+    };
+    let compared = report.compared;
+    format!(
+        "\nplaced for {aim} by --place {x},{y} --rotate {}: {gain}; {compared} places compared",
+        report.rotate_deg
+    )
 }
 
 /// The drawing time by what limited the speed, s; the longest first.

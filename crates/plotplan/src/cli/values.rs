@@ -1,9 +1,9 @@
 //! Values of options as text: lengths, angles, places, pens.
 
 use compiler::layout::Crop;
-pub(super) use compiler::option::{align, angle, hatch, length, place, scale, time};
+pub(super) use compiler::option::{align, angle, hatch, length, scale, time};
 
-use super::PageChoice;
+use super::{PageChoice, Place};
 
 /// The name of a file, a machine, a port or the like.
 pub(super) fn name() -> clap::builder::NonEmptyStringValueParser {
@@ -110,4 +110,13 @@ pub(super) fn fault(text: &str) -> Result<backends::Fault, String> {
         "switch-stuck" => Fault::Switch(SwitchFault::Stuck(number(first)?.min(1) as u8)),
         _ => return Err(what.to_owned()),
     })
+}
+
+/// Two lengths with a comma between, or `best`.
+pub(super) fn place(text: &str) -> Result<Place, String> {
+    if text == "best" {
+        return Ok(Place::Best);
+    }
+    let (x, y) = compiler::option::place(text).map_err(|error| format!("{error}, or `best`"))?;
+    Ok(Place::At(x, y))
 }
