@@ -188,8 +188,8 @@ impl Answer<'_> {
             ("Cache-Control", "no-cache"),
             ("Connection", "close"),
         ];
-        let lines: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
-        format!("HTTP/1.1 {} {reason}\r\n{lines}\r\n", self.status)
+        let lines: Vec<String> = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
+        format!("HTTP/1.1 {} {reason}\r\n{}\r\n", self.status, lines.concat())
     }
 }
 
