@@ -137,8 +137,8 @@ fn run(dir: &TestDir, page: &str, line: &str) {
     // What reads from a pipe is not ours.
     let line = line.split(" | ").next().unwrap_or_default();
     let mut words: Vec<&str> = line.split_whitespace().skip(1).collect();
-    if words.first() == Some(&"studio") {
-        // It serves until it is ended, and only where the program was built with its files.
+    if ["studio", "jog"].contains(&words[0]) {
+        // They wait for a browser and for a machine.
         words.push("--help");
     }
     if words.first() == Some(&"send") {

@@ -47,18 +47,13 @@ pub(crate) fn write(
         use std::os::unix::fs::PermissionsExt as _;
         temporary.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let file = temporary.tempfile_in(folder).map_err(|error| failed(without_path(&error)))?;
-    let mut out = BufWriter::with_capacity(1 << 16, file);
-    write(&mut out).and_then(|()| out.flush()).map_err(|error| failed(with_number(error)))?;
-    let file = out.into_inner().map_err(|error| failed(with_number(error.into_error())))?;
+    let mut file = temporary.tempfile_in(folder).map_err(|error| failed(without_path(&error)))?;
+    // The file itself: errors of `NamedTempFile` name the temporary path.
+    let mut out = BufWriter::with_capacity(1 << 16, file.as_file_mut());
+    write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
+    drop(out);
     file.persist(path).map_err(|error| failed(error.error))?;
     Ok(())
-}
-
-/// The system's own error, where there is one; errors of writers stay as they are.
-fn with_number(error: std::io::Error) -> std::io::Error {
-    let plain = without_path(&error);
-    if plain.raw_os_error().is_some() { plain } else { error }
 }
 
 /// The system's own error: the text around it names the temporary file.
