@@ -3,6 +3,7 @@
 use drawing::Pen;
 use hpgl::{Generation, Profile, ProfileReason, Wrappers};
 
+use super::foreign::{self, Foreign};
 use super::{Diagnostic, Document, Fact, ImportError, Importer, Options, Page, PenSettings, Severity};
 
 /// HP-GL has no signature: what no other importer recognizes is read as HP-GL.
@@ -21,6 +22,15 @@ pub(super) fn explain(code: &str) -> Option<(String, &'static str)> {
 
 fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     let document = hpgl::read(bytes, &reader_options(options)?);
+    let has_ink = document.pages.iter().any(|page| !page.drawing.strokes.is_empty());
+    let known = document.summary.used.iter().map(|(_, count)| *count as u64).sum();
+    let is_junk = |found: &&hpgl::Diagnostic| {
+        JUNK.contains(&found.code.name()) && !(has_ink && found.code.name() == CONTROL_BYTE)
+    };
+    let junk = document.diagnostics.iter().filter(is_junk).map(|found| found.count as u64).sum();
+    if let Some(Foreign { what, help }) = foreign::unlikely(known, junk, has_ink) {
+        return Err(ImportError::Foreign { what, help });
+    }
     let facts = facts(bytes, &document.summary);
     let white = &document.summary.white_pens;
     let is_skipped = |pen: &Pen| options.skip_white_pens && white.contains(pen);
@@ -90,6 +100,12 @@ fn diagnostic(found: hpgl::Diagnostic) -> Diagnostic {
         pen_mm: Some([x, y]),
     }
 }
+
+/// Codes of findings about bytes that are no HP-GL: unknown commands, stray characters, control
+/// bytes, numbers and text between commands.
+const JUNK: &[&str] = &["H0101", "H0102", CONTROL_BYTE, "H0104", "H0105"];
+/// Captures of serial lines have many of them beside their drawing.
+const CONTROL_BYTE: &str = "H0103";
 
 /// The code of white pens.
 const WHITE_PEN: &str = "H0229";
