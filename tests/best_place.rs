@@ -71,7 +71,7 @@ fn finest_place_of_a_polar_machine_is_near_its_pole() {
     let found = &best["outputs"][0]["summary"]["best_place"];
     let figure = found["figure"].as_f64().expect("a number");
     assert!((figure - worst(&best)).abs() < 0.03 * figure, "{figure}, certified {}", worst(&best));
-    assert!(worst(&best) < 0.8 * worst(&centered), "{} of {}", worst(&best), worst(&centered));
+    assert!(worst(&best) < 0.95 * worst(&centered), "{} of {}", worst(&best), worst(&centered));
     assert!(best["outputs"][0]["summary"]["beyond_sheet_mm"] == 0.0, "{best}");
 }
 
