@@ -196,6 +196,9 @@ fn wrong_scripts_and_protocols_without_positions_are_refused() {
     assert!(stderr(&wrong).contains("line 2") && stderr(&wrong).contains("`jump`"), "{}", stderr(&wrong));
     let blind = jog(&dir, "xy-serial", "hbot", "where\n", "");
     assert!(stderr(&blind).contains("do not report their position"), "{}", stderr(&blind));
+    // Without a terminal there is no full screen.
+    let screen = PROGRAM.run(&dir, "jog --protocol ticks --port tty -m coaxial");
+    assert!(!screen.status.success());
     drop(device);
 }
 

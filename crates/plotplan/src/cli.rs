@@ -101,7 +101,7 @@ pub(crate) enum Command {
     Calibrate(Calibrate),
     /// Send a plan to a machine
     Send(Send),
-    /// Move a machine by hand: by the commands of a script
+    /// Move a machine by hand: keys in a full screen, or a script
     Jog(Jog),
     /// Make the plans of a project, `plotplan.toml`, that are out of date
     Build(Build),

@@ -128,9 +128,9 @@ pub(crate) struct Jog {
     /// Speed of the port
     #[arg(long, value_name = "BAUD", default_value_t = 115_200)]
     pub(crate) baud: u32,
-    /// Commands, one a line; `-` for standard input
+    /// Take commands from a file instead of the keyboard, one a line; `-` for standard input
     #[arg(long, value_name = "FILE", value_parser = name())]
-    pub(crate) commands: String,
+    pub(crate) commands: Option<String>,
     /// Append touches to this file, for calibrate
     #[arg(long, value_name = "FILE.csv", value_parser = name())]
     pub(crate) touches: Option<String>,

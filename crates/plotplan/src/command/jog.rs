@@ -1,9 +1,10 @@
-//! `plotplan jog`: moves a machine by hand, by the commands of a script.
+//! `plotplan jog`: moves a machine by hand, from a full screen or by the commands of a script.
 //!
 //! A jog is a travel of one row that is sent as `send` sends a resumed plan: from where the machine reports to
 //! be, within its limits, pen up. So it works with every controller that reports its position.
 
 mod command;
+mod screen;
 
 use std::fs;
 use std::io::{BufRead as _, Write as _};
@@ -42,7 +43,7 @@ pub(crate) fn run(arguments: &Jog) -> Result<(), Failure> {
     }
     let machine = machines::machine(&arguments.machine)?.machine;
     let settings = Settings { path: arguments.port.clone(), baud: arguments.baud, flow: FlowControl::None };
-    let script = script(&arguments.commands)?;
+    let script = arguments.commands.as_deref().map(script).transpose()?;
     let mut wire = Wire::open(settings, arguments.log.as_deref())?;
     homing::ensure(arguments.datum, false, backend, &machine, &mut wire)?;
     let mut jogger = Jogger {
@@ -59,7 +60,10 @@ pub(crate) fn run(arguments: &Jog) -> Result<(), Failure> {
         touches_file: arguments.touches.clone(),
     };
     jogger.locate()?;
-    jogger.follow(&script)
+    match script {
+        Some(lines) => jogger.follow(&lines),
+        None => screen::run(&mut jogger),
+    }
 }
 
 /// The lines of a script; of standard input as they come.
@@ -202,7 +206,7 @@ impl Jogger<'_> {
     /// Moves the pen in a straight line, as far as the machine reaches.
     fn go_to(&mut self, to: Point, stops: &mut dyn FnMut() -> bool) -> Result<(), JogError> {
         let refuse = |what: String| JogError::Refused(format!("{:.2}, {:.2} mm: {what}", to.x, to.y));
-        self.machine.check_point(to).map_err(|error| refuse(error.to_string()))?;
+        self.machine.check_point(to).map_err(|error| JogError::Refused(error.to_string()))?;
         let pose = self.machine.pose_near(to, &self.pose()).map_err(|error| refuse(error.to_string()))?;
         if let Some(fault) = self.machine.joint_fault(&pose) {
             return Err(refuse(fault.to_string()));
@@ -211,7 +215,7 @@ impl Jogger<'_> {
         let here = self.pen();
         if self.machine.check_point(here).is_ok() {
             let line = Segment::Line(Line::new(here, to));
-            self.machine.check_segment(&line).map_err(|error| refuse(error.to_string()))?;
+            self.machine.check_segment(&line).map_err(|error| JogError::Refused(error.to_string()))?;
         }
         let ticks = self.machine.motor_positions(&pose).0.map(|ticks| ticks.round() as i64);
         self.drive(ticks, stops)?;
@@ -396,6 +400,28 @@ impl Jogger<'_> {
         written.map_err(|error| Failure::writing(error, &file))?;
         self.touches += 1;
         Ok(format!("touch {} at {x}, {y} mm of the sheet: {a}, {b} ticks", self.touches))
+    }
+
+    /// How far the pen is from the edges of what it reaches, mm: left, right, down, up; at most 999.
+    fn margins(&self) -> [f64; 4] {
+        let here = self.pen();
+        [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)].map(|(x, y)| {
+            let mut low = 0.0;
+            let mut high = 999.0;
+            let fits = |mm: f64| {
+                let to = here + mm * Vec2::new(x, y);
+                self.machine.check_point(to).is_ok()
+                    && self.machine.check_segment(&Segment::Line(Line::new(here, to))).is_ok()
+            };
+            if fits(high) {
+                return high;
+            }
+            while high - low > 0.05 {
+                let middle = 0.5 * (low + high);
+                if fits(middle) { low = middle } else { high = middle }
+            }
+            low
+        })
     }
 }
 

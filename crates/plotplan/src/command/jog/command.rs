@@ -2,7 +2,7 @@
 
 use compiler::quantity;
 
-/// What a line asks for.
+/// What a key or a line asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum JogCommand {
     /// By the step, in this direction.
@@ -30,7 +30,7 @@ pub(super) enum JogCommand {
 }
 
 /// Short names of the corners.
-const CORNERS: [&str; 4] = ["ll", "lr", "ur", "ul"];
+pub(super) const CORNERS: [&str; 4] = ["ll", "lr", "ur", "ul"];
 
 /// The command of a line; `None` for an empty one or a comment.
 pub(super) fn parse(line: &str) -> Result<Option<JogCommand>, String> {
