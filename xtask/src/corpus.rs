@@ -189,7 +189,7 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Du
 }
 
 /// CPU time that a process has used, by Linux's `/proc/PID/stat`: fields 14 and 15, user and system
-/// time in hundredths of a second (proc_pid_stat(5); `USER_HZ` is 100 on all its architectures).
+/// time in hundredths of a second (`proc_pid_stat(5)`; `USER_HZ` is 100 on all its architectures).
 fn cpu_time(process: u32) -> Option<Duration> {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // The name of the program, field 2, is in parentheses and may contain blanks.

@@ -23,11 +23,11 @@ pub(super) fn explain(code: &str) -> Option<(String, &'static str)> {
 fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     let document = hpgl::read(bytes, &reader_options(options)?);
     let has_ink = document.pages.iter().any(|page| !page.drawing.strokes.is_empty());
-    let known = document.summary.used.iter().map(|(_, count)| *count as u64).sum();
+    let known = document.summary.used.iter().map(|(_, count)| *count).sum();
     let is_junk = |found: &&hpgl::Diagnostic| {
         JUNK.contains(&found.code.name()) && !(has_ink && found.code.name() == CONTROL_BYTE)
     };
-    let junk = document.diagnostics.iter().filter(is_junk).map(|found| found.count as u64).sum();
+    let junk = document.diagnostics.iter().filter(is_junk).map(|found| found.count).sum();
     if let Some(Foreign { what, help }) = foreign::unlikely(known, junk, has_ink) {
         return Err(ImportError::Foreign { what, help });
     }
