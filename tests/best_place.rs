@@ -51,11 +51,11 @@ fn duration_is_that_of_the_plan_and_below_that_in_the_middle() {
     let centered = report(&dir, &format!("{plan} --align center"));
     let (best, centered) = (&best["outputs"][0]["summary"], &centered["outputs"][0]["summary"]);
     let found = &best["best_place"];
-    assert_eq!(found["figure"], best["duration_s"], "{found}");
+    assert_eq!(found["duration_s"], best["duration_s"], "{found}");
     // The middle in hundredths of a millimetre.
-    let middle = found["figure_centered"].as_f64().expect("a duration");
+    let middle = found["centered_duration_s"].as_f64().expect("a duration");
     assert!((middle - centered["duration_s"].as_f64().expect("a duration")).abs() < 0.05, "{found}");
-    assert!(found["figure"].as_f64().expect("a duration") < 0.95 * middle, "{found}");
+    assert!(found["duration_s"].as_f64().expect("a duration") < 0.95 * middle, "{found}");
 }
 
 /// On the polar machine a tick of the table moves the pen in proportion to the radius.
@@ -69,7 +69,7 @@ fn finest_place_of_a_polar_machine_is_near_its_pole() {
         report["outputs"][0]["certificate"]["tick_floor"]["worst_mm"].as_f64().expect("a number")
     };
     let found = &best["outputs"][0]["summary"]["best_place"];
-    let figure = found["figure"].as_f64().expect("a number");
+    let figure = found["quantization_error_mm"].as_f64().expect("a number");
     assert!((figure - worst(&best)).abs() < 0.03 * figure, "{figure}, certified {}", worst(&best));
     assert!(worst(&best) < 0.95 * worst(&centered), "{} of {}", worst(&best), worst(&centered));
     assert!(best["outputs"][0]["summary"]["beyond_sheet_mm"] == 0.0, "{best}");

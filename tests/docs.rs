@@ -140,7 +140,10 @@ fn run(dir: &TestDir, page: &str, line: &str) {
     if words.starts_with(&["machine", "new"]) {
         // It replaces no file, and the pages go on with a machine that is there.
         let _ = fs::remove_file(dir.path().join("new.toml"));
-        words.iter_mut().filter(|word| word.strip_suffix(".toml").is_some()).for_each(|word| *word = "new.toml");
+        words
+            .iter_mut()
+            .filter(|word| word.strip_suffix(".toml").is_some())
+            .for_each(|word| *word = "new.toml");
         // Questions are for a person.
         if !words.contains(&"--defaults") {
             words.push("--defaults");

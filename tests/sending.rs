@@ -660,8 +660,9 @@ fn pen_plotter_refusals() {
         &["send", "far.hpgl", "--protocol", "hpgl", "--port", "tty"],
         "it reports the limits (OH) 0,0 to 11040,7721",
     );
+    std::fs::write(desk.path("plain.plt"), "IN;SP1;PU0,0;PD400,0;PU;").expect("a file");
     refused(
-        &["send", "a.plt", "--protocol", "hpgl", "--port", "tty", "--plotter", "hp7550a"],
+        &["send", "plain.plt", "--protocol", "hpgl", "--port", "tty", "--plotter", "hp7550a"],
         "calls itself 7475A",
     );
     // Limits from a file.

@@ -56,7 +56,7 @@ const PROPTEST_SEED: &str = "20261122";
 /// Fuzz targets (`fuzz/fuzz_targets`), seconds for each.
 pub(crate) const FUZZ_TARGETS: &[&str] =
     &["read", "emit", "svg", "recognize", "plans", "machines", "answers"];
-const FUZZ_SECONDS: u32 = 15;
+const FUZZ_SECONDS: u32 = 8;
 
 /// Runs the named steps, or the default ones, up to the first failure; prints the time of each.
 pub(crate) fn run_steps(names: &[&str]) -> Result<bool> {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::round;
 use super::text;
-use crate::best_place::BestPlace;
+use crate::best_place::{BestFor, BestPlace};
 use crate::pipeline::Compiled;
 
 /// The summary of a plan.
@@ -67,12 +67,15 @@ pub struct BestPlaceReport {
     pub place_mm: [f64; 2],
     /// Counterclockwise rotation, degrees (`--rotate`).
     pub rotate_deg: f64,
-    /// For `time` the duration, s; for `accuracy` the largest quantization error along the ink (half a
-    /// tick of both motors), mm.
-    pub figure: f64,
-    /// The same of the drawing in the middle of the sheet without a turn; `null` where the machine cannot
-    /// draw it there.
-    pub figure_centered: Option<f64>,
+    /// Duration of the plan, s; `null` for `accuracy`.
+    pub duration_s: Option<f64>,
+    /// The same of the drawing in the middle of the sheet without a turn; `null` for `accuracy` and where
+    /// the machine cannot draw it there.
+    pub centered_duration_s: Option<f64>,
+    /// The largest quantization error along the ink (half a tick of both motors), mm; `null` for `time`.
+    pub quantization_error_mm: Option<f64>,
+    /// The same in the middle of the sheet; `null` likewise.
+    pub centered_quantization_error_mm: Option<f64>,
     /// Placements that were compared.
     pub compared: usize,
 }
@@ -83,12 +86,15 @@ impl BestPlaceReport {
             planner::Scale::Explicit { origin_mm, .. } => origin_mm,
             _ => drawing::Vec2::ZERO,
         };
+        let of = |aim: BestFor, figure: Option<f64>| figure.filter(|_| best.aim == aim);
         Self {
             best_for: best.aim.name(),
             place_mm: [round::mm(origin.x), round::mm(origin.y)],
             rotate_deg: round::mm(best.options.rotate_rad.to_degrees()),
-            figure: round::s(best.figure),
-            figure_centered: best.centered.map(round::s),
+            duration_s: of(BestFor::Time, Some(best.figure)).map(round::s),
+            centered_duration_s: of(BestFor::Time, best.centered).map(round::s),
+            quantization_error_mm: of(BestFor::Accuracy, Some(best.figure)).map(round::mm),
+            centered_quantization_error_mm: of(BestFor::Accuracy, best.centered).map(round::mm),
             compared: best.compared,
         }
     }
