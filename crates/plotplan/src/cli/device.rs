@@ -56,10 +56,10 @@ impl PenLift {
 /// How the machine's start pose is found.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct Datum {
-    /// Home first, as [homing] of the machine file states
+    /// Home first, as `[homing]` of the machine file states
     #[arg(long, conflicts_with = "assume_homed")]
     pub(crate) home: bool,
-    /// Take the machine's start pose for granted, though it has [homing] and does not know where it is
+    /// Take the machine's start pose for granted, though it has `[homing]` and does not know where it is
     #[arg(long)]
     pub(crate) assume_homed: bool,
 }
@@ -226,7 +226,7 @@ pub(crate) struct Emulate {
     /// For ticks: announce the room in the receive buffer in the answer to line 0
     #[arg(long)]
     pub(crate) announce_room: bool,
-    /// Homed before: xy-serial, and machines with [homing]
+    /// Homed before: xy-serial, and machines with `[homing]`
     #[arg(long)]
     pub(crate) homed: bool,
 }
