@@ -8,7 +8,7 @@ use compiler::scene;
 use compiler::view::{DrawingView, SourceFile, View, description};
 use drawing::{Affine, Drawing, Span};
 use kinematics::Machine;
-use plan::{Header, Limits, Motor, Row};
+use plan::{Header, Row};
 use planner::{PlacementOptions, PlanError, Scale};
 use serde_json::{Value, json};
 use viewer::Columns;
@@ -313,14 +313,7 @@ fn standing(machine: &Machine, title: &str) -> Reply {
     let rows = [Row { t_us: 0, pen: 0, ticks }];
     let header = Header {
         machine: machine.name().to_owned(),
-        motors: machine.motors().clone().map(|motor| Motor {
-            name: motor.name,
-            limits: Limits {
-                speed: motor.max_speed_ticks_s,
-                acceleration: motor.max_acceleration_ticks_s2,
-                jerk: motor.max_jerk_ticks_s3,
-            },
-        }),
+        motors: pipeline::header_motors(machine),
         placement: Affine::IDENTITY.as_coeffs(),
         period_us: ((machine.parts().period_s * 1e6).round() as u64).max(1),
         lift_overlap_us: 0,

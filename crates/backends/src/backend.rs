@@ -134,7 +134,7 @@ pub trait Backend: fmt::Debug + Send + Sync {
         Err(Unrepresentable::NotSent { format: self.name() }.into())
     }
 
-    /// How the firmware is told to home this machine; `None` where it cannot, and where the machine's
+    /// The steps that home this machine through its firmware; `None` where it cannot, and where the machine's
     /// homing is a pose that a person sets.
     fn homing(&self, _machine: &Machine) -> Option<HomingSteps> {
         None

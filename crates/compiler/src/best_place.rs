@@ -67,8 +67,8 @@ const STEPS: usize = 60;
 const SAMPLES: f64 = 400.0;
 /// Segments that are planned for the comparison of durations, all placements together.
 const PLANNED_SEGMENTS: usize = 40_000;
-/// Positions and turns are multiples of this, mm and degrees.
-const RESOLUTION: f64 = 0.01;
+/// Positions and turns are multiples of 1 / this, mm and degrees.
+const PER_UNIT: f64 = 100.0;
 
 /// A piece of the ink: a point with the direction in which it is drawn (a unit vector), and its length.
 #[derive(Clone, Copy, Debug)]
@@ -237,13 +237,13 @@ impl Frame {
     fn origin(&self, spot: Spot) -> Vec2 {
         let along = |low: f64, free: f64, share: f64| {
             let exact = low + share * free;
-            let multiple = (exact / RESOLUTION).round();
+            let multiple = (exact * PER_UNIT).round();
             // Inside the free area, if a multiple of the resolution lies there.
-            let inside = |multiple: &f64| (low..=low + free).contains(&(multiple * RESOLUTION));
+            let inside = |multiple: &f64| (low..=low + free).contains(&(multiple / PER_UNIT));
             [multiple, multiple + 1.0, multiple - 1.0]
                 .into_iter()
                 .find(inside)
-                .map_or(exact, |multiple| multiple / RESOLUTION.recip().round())
+                .map_or(exact, |multiple| multiple / PER_UNIT)
         };
         Vec2::new(along(self.low.x, self.free.x, spot[0]), along(self.low.y, self.free.y, spot[1]))
     }
@@ -323,7 +323,7 @@ impl Searcher<'_> {
                 near[axis] = if axis < 2 {
                     near[axis].clamp(0.0, 1.0)
                 } else {
-                    (near[axis] / RESOLUTION).round() * RESOLUTION
+                    (near[axis] * PER_UNIT).round() / PER_UNIT
                 };
                 let figure = self.estimate(near)?.filter(|figure| *figure < 0.9999 * least);
                 if let Some(figure) = figure {

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use drawing::{Affine, Drawing, Pen, Point, Rect, Vec2};
 use kinematics::{Fault, JointPos, Machine};
-use plan::{Header, Limits, Motor, Rounding};
+use plan::{Header, Limits, MOTORS, Motor, Rounding};
 use planner::{PlacementOptions, PlanError, Settings, Surface, TimingLaw, Trajectory};
 use verify::Certificate;
 
@@ -370,6 +370,18 @@ fn duration_of(placed: Drawing, machine: &Machine, request: &Request) -> Option<
     Some(trajectory.duration_us() as f64 * 1e-6)
 }
 
+/// The motors of a machine with their limits, as the header of a plan states them.
+pub fn header_motors(machine: &Machine) -> [Motor; MOTORS] {
+    machine.motors().clone().map(|motor| Motor {
+        name: motor.name,
+        limits: Limits {
+            speed: motor.max_speed_ticks_s,
+            acceleration: motor.max_acceleration_ticks_s2,
+            jerk: motor.max_jerk_ticks_s3,
+        },
+    })
+}
+
 /// The planner's settings of a request.
 fn planner_settings(request: &Request) -> Settings {
     Settings {
@@ -404,14 +416,7 @@ fn planned<'a>(
 
     let header = Header {
         machine: machine.name().to_owned(),
-        motors: machine.motors().clone().map(|motor| Motor {
-            name: motor.name,
-            limits: Limits {
-                speed: motor.max_speed_ticks_s,
-                acceleration: motor.max_acceleration_ticks_s2,
-                jerk: motor.max_jerk_ticks_s3,
-            },
-        }),
+        motors: header_motors(machine),
         placement: placement.as_coeffs(),
         period_us: request.period_us,
         lift_overlap_us: (request.lift_overlap_s * 1e6).round() as u64,

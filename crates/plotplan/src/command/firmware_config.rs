@@ -123,8 +123,8 @@ fn homing(machine: &Machine) -> Result<[String; 2], Failure> {
         let ticks = mv.ticks_per_unit(machine);
         let most = ticks[0].abs().max(ticks[1].abs());
         let travel_ticks = mv.timeout_s * mv.speed.abs() * most;
-        // Whole ticks in the ratio of the motors, few enough for the firmware's bytes, so many that the
-        // longest way is not more than its counter holds.
+        // Whole ticks in the ratio of the motors, few enough for the firmware's bytes, enough that
+        // its counter holds the longest way.
         let fewest = (travel_ticks / f64::from(u16::MAX)).ceil().max(1.0) as u32;
         let error = |n: u32| {
             let off = |ticks: f64| {

@@ -16,7 +16,7 @@ use backends::{
 };
 use drawing::{Line, Point, Segment, Vec2};
 use kinematics::{JointPos, Machine, MotorPos};
-use plan::{Header, Limits, Motor, Rounding, Row};
+use plan::{Header, Rounding, Row};
 use serialport::FlowControl;
 
 use self::command::JogCommand;
@@ -427,17 +427,9 @@ impl Jogger<'_> {
 
 /// The header of a plan of these rows.
 fn header(machine: &Machine, rows: &[Row]) -> Header {
-    let motors = machine.motors().clone().map(|motor| Motor {
-        name: motor.name,
-        limits: Limits {
-            speed: motor.max_speed_ticks_s,
-            acceleration: motor.max_acceleration_ticks_s2,
-            jerk: motor.max_jerk_ticks_s3,
-        },
-    });
     Header {
         machine: machine.name().to_owned(),
-        motors,
+        motors: compiler::pipeline::header_motors(machine),
         placement: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         period_us: (machine.parts().period_s * 1e6).round() as u64,
         lift_overlap_us: 0,
