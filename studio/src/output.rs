@@ -212,7 +212,9 @@ impl Studio {
 fn encode(backend: &dyn Backend, planned: &Planned, out: &mut Vec<u8>) -> Result<Vec<String>, Problems> {
     backend.check(&planned.machine).map_err(unwritten)?;
     let pens: Vec<u16> = planned.drawn.pens().into_iter().map(|pen| pen.0).collect();
-    let losses = backend.losses(&planned.header, &pens).iter().map(ToString::to_string).collect();
+    let losses =
+        backend.losses(&planned.header, &pens).into_iter().chain(backend.file_caveat(&planned.machine));
+    let losses = losses.map(|loss| loss.to_string()).collect();
     let rows =
         || -> RowIter<'_> { Box::new(planned.rows.iter().copied().zip(planned.exact.iter().copied())) };
     let source =

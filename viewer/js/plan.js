@@ -26,6 +26,8 @@ export function rowAt(times, t) {
  * @property {Float64Array} t  s
  * @property {Uint16Array} pen  from each row to the next; 0 is up
  * @property {[Float64Array, Float64Array]} q  motors, ticks
+ * @property {[Float64Array, Float64Array] | null} lag  where the mechanism is against the motors, ticks; null
+ *   without backlash
  * @property {Float32Array} x  the pen over the paper, machine mm
  * @property {Float32Array} y
  * @property {Int32Array} first  the first row of each stroke
@@ -37,10 +39,22 @@ export function rowAt(times, t) {
  * @param {(a: number, b: number, out: Float64Array) => void} position  of the pen
  * @param {[Float64Array, Float64Array] | null} off  of a machine that moves in whole ticks: how far those
  *   are from the nearest ones; empty where they are those
+ * @param {[number, number]} play  backlash of the motors, ticks
  * @returns {Track}
  */
-export function track(t, pens, q, position, off) {
+export function track(t, pens, q, position, off, play) {
   const count = t.length;
+  const loads = new Float64Array(2);
+  /** @type {[Float64Array, Float64Array] | null} */
+  const lag = play[0] > 0 || play[1] > 0 ? [new Float64Array(count), new Float64Array(count)] : null;
+  /** The mechanism follows a motor that has taken up its play. @param {0 | 1} k @param {number} row @param {number} motor */
+  const load = (k, row, motor) => {
+    if (!lag) return motor;
+    const half = 0.5 * play[k];
+    loads[k] = row === 0 ? motor : Math.min(Math.max(loads[k], motor - half), motor + half);
+    lag[k][row] = loads[k] - motor;
+    return loads[k];
+  };
   const x = new Float32Array(count);
   const y = new Float32Array(count);
   const pen = Uint16Array.from(pens);
@@ -50,8 +64,9 @@ export function track(t, pens, q, position, off) {
   for (let row = 0; row < count; row++) {
     const a = q[0][row];
     const b = q[1][row];
-    if (off) position(Math.floor(a + 0.5) + (off[0][row] ?? 0), Math.floor(b + 0.5) + (off[1][row] ?? 0), at);
-    else position(a, b, at);
+    const whole = (/** @type {0 | 1} */ k, /** @type {number} */ exact) =>
+      off ? Math.floor(exact + 0.5) + (off[k][row] ?? 0) : exact;
+    position(load(0, row, whole(0, a)), load(1, row, whole(1, b)), at);
     x[row] = at[0];
     y[row] = at[1];
     const before = row > 0 ? pen[row - 1] : 0;
@@ -61,16 +76,17 @@ export function track(t, pens, q, position, off) {
     }
   }
   if (last.length < first.length) last.push(count - 1);
-  return { t, pen, q, x, y, first: Int32Array.from(first), last: Int32Array.from(last) };
+  return { t, pen, q, lag, x, y, first: Int32Array.from(first), last: Int32Array.from(last) };
 }
 
-/** The motor positions at a time. @param {Track} of @param {number} t @returns {[number, number]} */
+/** Where the mechanism is at a time, in the motors' ticks. @param {Track} of @param {number} t @returns {[number, number]} */
 export function motorsAt(of, t) {
   const row = rowAt(of.t, t);
   const next = Math.min(row + 1, of.t.length - 1);
   const span = of.t[next] - of.t[row];
   const share = span > 0 ? Math.min(Math.max((t - of.t[row]) / span, 0), 1) : 0;
-  const at = (/** @type {0 | 1} */ k) => of.q[k][row] + share * (of.q[k][next] - of.q[k][row]);
+  const load = (/** @type {0 | 1} */ k, /** @type {number} */ index) => of.q[k][index] + (of.lag?.[k][index] ?? 0);
+  const at = (/** @type {0 | 1} */ k) => load(k, row) + share * (load(k, next) - load(k, row));
   return [at(0), at(1)];
 }
 
@@ -113,7 +129,9 @@ export function motion(meta, rows) {
   }
   const inverse = 1 / (stride * period);
   // Rows are a period apart but for rests, at whose ends the motors do not move.
-  const { q } = rows;
+  const { q, lag } = rows;
+  /** @type {[Float64Array, Float64Array]} */
+  const loads = lag ? [q[0].map((a, row) => a + lag[0][row]), q[1].map((b, row) => b + lag[1][row])] : q;
   const result = {
     speed: motors.map(() => new Float32Array(count)),
     acceleration: motors.map(() => new Float32Array(count)),
@@ -129,7 +147,7 @@ export function motion(meta, rows) {
     for (let k = 0; k < motors.length; k++) {
       motorMotion(q[k], start, end, stride, inverse, motors[k], result.speed[k], result.acceleration[k], result.jerk[k]);
     }
-    penMotion(q, start, end, stride, inverse, position, result.pen);
+    penMotion(loads, start, end, stride, inverse, position, result.pen);
     start = end;
   }
   return result;

@@ -86,9 +86,13 @@ export class Viewer {
     const position = penOf(meta.machine);
     const seconds = (/** @type {Float64Array} */ us) => us.map((t) => t * 1e-6);
     const ticks = (/** @type {string} */ name, /** @type {number} */ k) => column(name).map((value) => value * meta.tick_units[k]);
-    this.rows = track(seconds(column("t")), column("pen"), [ticks("a", 0), ticks("b", 1)], position, [column("off_a"), column("off_b")]);
+    const [playA, playB] = meta.machine.motors.map((/** @type {any} */ motor) => motor.backlash ?? 0);
+    this.rows = track(
+      seconds(column("t")), column("pen"), [ticks("a", 0), ticks("b", 1)], position, [column("off_a"), column("off_b")],
+      [playA, playB],
+    );
     this.predicted = numbers.has("predicted_t")
-      ? track(seconds(column("predicted_t")), column("predicted_pen"), [ticks("predicted_a", 0), ticks("predicted_b", 1)], position, null)
+      ? track(seconds(column("predicted_t")), column("predicted_pen"), [ticks("predicted_a", 0), ticks("predicted_b", 1)], position, null, [0, 0])
       : null;
     this.deviation = numbers.get("deviation") ?? null;
     this.end = this.rows.t[this.rows.t.length - 1];

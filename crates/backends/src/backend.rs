@@ -5,7 +5,7 @@ use std::io::Write;
 use std::sync::Arc;
 
 use drawing::Drawing;
-use kinematics::Machine;
+use kinematics::{Machine, Play};
 use plan::{Header, Row, TickTable};
 
 use crate::device::Device;
@@ -56,6 +56,11 @@ pub trait Backend: fmt::Debug + Send + Sync {
 
     /// Other information that is lost, or a setting that does not suit the firmware.
     fn caveat(&self, _header: &Header) -> Option<String> {
+        None
+    }
+
+    /// What of this machine a file in the format does not carry.
+    fn file_caveat(&self, _machine: &Machine) -> Option<Loss> {
         None
     }
 
@@ -130,6 +135,21 @@ pub trait Backend: fmt::Debug + Send + Sync {
         _plan: &PlanSource<'_>,
         _options: &EncodeOptions,
         _down: bool,
+    ) -> Result<Program, ProgramError> {
+        Err(Unrepresentable::NotSent { format: self.name() }.into())
+    }
+
+    /// The program for rows that go on from where the machine stands: before them the pen is as in the first
+    /// row, and after them as in the last one. `start` is where the motors of the machine's first plan started,
+    /// ticks.
+    ///
+    /// # Errors
+    /// As [`Self::program`].
+    fn continuing_program(
+        &self,
+        _plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        _start: [i64; 2],
     ) -> Result<Program, ProgramError> {
         Err(Unrepresentable::NotSent { format: self.name() }.into())
     }
@@ -322,6 +342,9 @@ pub struct SessionOptions {
 pub struct EmulatorOptions {
     /// Where its motors are, ticks; `None` if it does not know.
     pub start: Option<[i64; 2]>,
+    /// The play of its motors, from where they start; `None` for a machine without backlash, and for a firmware
+    /// whose positions are those of the pen.
+    pub play: Option<Play>,
     /// Whether it was homed before.
     pub homed: bool,
     /// How long homing takes it; `None` for a machine without `[homing]`, which knows where it is.

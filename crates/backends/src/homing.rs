@@ -123,6 +123,8 @@ pub struct EmulatedHoming {
     pub moves_us: [Option<[u64; 2]>; 2],
     /// A switch that does not work.
     pub fault: Option<SwitchFault>,
+    /// Whether a move goes to a mechanical stop, which firmwares that home by switches cannot find.
+    pub needs_stop: bool,
 }
 
 /// An emulated machine stands at this share of the way from its switch when it is switched on.
@@ -138,7 +140,7 @@ impl EmulatedHoming {
             let slow_s = 2.0 * mv.back_off / mv.slow_speed;
             *times = Some([us(fast_s + slow_s), us(mv.timeout_s)]);
         }
-        Self { moves_us, fault }
+        Self { moves_us, fault, needs_stop: homing.needs_stop() }
     }
 }
 

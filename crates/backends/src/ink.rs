@@ -1,15 +1,32 @@
 //! What a machine drew, in its own units.
 
+use kinematics::Play;
+
 /// Lines of ink in the order in which they were drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ink {
     lines: Vec<(u16, Vec<[f64; 2]>)>,
     down: bool,
+    /// The play between the motors and the pen.
+    play: Option<Play>,
 }
 
 impl Ink {
+    /// Of a machine with this play: places are where its motors are, and its ink is where they lead the pen.
+    pub fn through(play: Option<Play>) -> Self {
+        Self { play, ..Self::default() }
+    }
+
+    fn load(&mut self, motors: [f64; 2]) -> [f64; 2] {
+        self.play.as_mut().map_or(motors, |play| {
+            play.follow(motors);
+            play.loads()
+        })
+    }
+
     /// The pen is in this state (0 is up) at this place.
     pub fn pen(&mut self, pen: u16, at: [f64; 2]) {
+        let at = self.load(at);
         let current = self.lines.last().map_or(0, |line| line.0);
         if pen == 0 {
             self.down = false;
@@ -21,6 +38,7 @@ impl Ink {
 
     /// The pen goes straight to this place.
     pub fn go(&mut self, to: [f64; 2]) {
+        let to = self.load(to);
         if self.down
             && let Some((_, places)) = self.lines.last_mut()
             && places.last() != Some(&to)

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use kinematics::{Machine, Play};
 use plan::{Header, Row, TickTable};
 
 use crate::{Unrepresentable, retime};
@@ -78,6 +79,8 @@ struct EncodedTable {
     /// Where the motors of the whole plan start, ticks.
     start: [i64; 2],
     resumed: bool,
+    /// The play of the motors of a machine with backlash, at the start of the whole plan.
+    play: Option<Play>,
 }
 
 #[derive(Clone, Debug)]
@@ -120,7 +123,9 @@ pub enum ProgramError {
 
 /// The rows from `row` on, starting at `position` ticks with the pen up: travel, pen down if it was down, and the rest of
 /// the rows, accelerating from rest. With each row's index in `table`.
-fn resume(table: &TickTable, row: usize, position: [i64; 2]) -> (TickTable, Vec<u64>) {
+///
+/// With `play` the last part of the travel takes up the backlash: the mechanism is then where it is in the plan.
+fn resume(table: &TickTable, row: usize, position: [i64; 2], play: Option<Play>) -> (TickTable, Vec<u64>) {
     let rows = &table.rows;
     let index = row as u64;
     let period_us = table.header.period_us.max(1);
@@ -131,8 +136,14 @@ fn resume(table: &TickTable, row: usize, position: [i64; 2]) -> (TickTable, Vec<
         new.push(Row { t_us, pen, ticks });
         origin.push(index);
     };
-    for ticks in retime::travel(&table.header, position, rows[row].ticks) {
-        push(&mut new, period_us, ticks, 0, index);
+    let mut from = position;
+    for to in
+        play.map_or_else(Vec::new, |play| approach(rows, row, play)).into_iter().chain([rows[row].ticks])
+    {
+        for ticks in retime::travel(&table.header, from, to) {
+            push(&mut new, period_us, ticks, 0, index);
+        }
+        from = to;
     }
     if rows[row].pen != 0 {
         if new.len() == 1 {
@@ -151,6 +162,26 @@ fn resume(table: &TickTable, row: usize, position: [i64; 2]) -> (TickTable, Vec<
         push(&mut new, duration_us, rows[to].ticks, rows[to].pen, to as u64);
     }
     (with_rows(&table.header, new), origin)
+}
+
+/// Where the motors go before row `row` of a plan so that the mechanism gets to where it is in the plan, whatever the
+/// play between them was: beyond it, and back by more than the play to where they move it.
+fn approach(rows: &[Row], row: usize, mut play: Play) -> Vec<[i64; 2]> {
+    for row in &rows[..=row] {
+        play.follow(row.ticks.map(|ticks| ticks as f64));
+    }
+    let (loads, backlash) = (play.loads(), play.backlash());
+    let mut ways = [[0; 2]; 2];
+    for motor in 0..2 {
+        let ticks = rows[row].ticks[motor];
+        // From the side on which the motor leads in the plan.
+        let side = if (ticks as f64) < loads[motor] { -1.0 } else { 1.0 };
+        let taken_up = loads[motor] + 0.5 * side * backlash[motor];
+        let beyond = taken_up - side * 2.0 * backlash[motor];
+        ways[0][motor] = if backlash[motor] > 0.0 { beyond.round() as i64 } else { ticks };
+        ways[1][motor] = if backlash[motor] > 0.0 { taken_up.round() as i64 } else { ticks };
+    }
+    ways.into()
 }
 
 /// The rows up to `row`, then to rest as soon as the limits allow, pen up. With each row's index in `table`.
@@ -200,7 +231,7 @@ impl EncodedTable {
         }
         let position =
             position.map_or(self.table.rows[row as usize].ticks, |at| self.encoder.ticks_at(at, self.start));
-        let (table, origin) = resume(&self.table, row as usize, position);
+        let (table, origin) = resume(&self.table, row as usize, position, self.play);
         Self {
             table,
             origin,
@@ -208,6 +239,7 @@ impl EncodedTable {
             reached: Vec::new(),
             start: self.start,
             resumed: true,
+            play: None,
         }
         .encode()
     }
@@ -234,8 +266,8 @@ impl EncodedTable {
         let origin: Vec<u64> = stopped.iter().map(|index| self.origin[*index as usize]).collect();
         let row = origin.last().copied().unwrap_or(0);
         let encoder = Arc::clone(&self.encoder);
-        let cut =
-            Self { table, origin, encoder, reached: Vec::new(), start: self.start, resumed: self.resumed };
+        let (start, resumed) = (self.start, self.resumed);
+        let cut = Self { table, origin, encoder, reached: Vec::new(), start, resumed, play: None };
         let mut lines = cut.encode()?.lines;
         // What was sent is the same up to here, but for the counts in a first line.
         let mut tail = lines.split_off(sent.len().min(lines.len()));
@@ -254,7 +286,26 @@ impl Program {
     pub fn of_table(table: TickTable, encoder: Arc<dyn RowEncoder>) -> Result<Self, ProgramError> {
         let start = table.rows.first().ok_or(ProgramError::Empty)?.ticks;
         let origin = (0..table.rows.len() as u64).collect();
-        EncodedTable { table, encoder, origin, reached: Vec::new(), start, resumed: false }.encode()
+        EncodedTable { table, encoder, origin, reached: Vec::new(), start, resumed: false, play: None }
+            .encode()
+    }
+
+    /// The same for rows that go on from where the machine stands. `start` is where the motors of the machine's
+    /// first plan started, ticks: what positions that it reports count from.
+    ///
+    /// # Errors
+    /// As [`Self::of_table`].
+    pub fn continuing(
+        table: TickTable,
+        encoder: Arc<dyn RowEncoder>,
+        start: [i64; 2],
+    ) -> Result<Self, ProgramError> {
+        if table.rows.is_empty() {
+            return Err(ProgramError::Empty);
+        }
+        let origin = (0..table.rows.len() as u64).collect();
+        EncodedTable { table, encoder, origin, reached: Vec::new(), start, resumed: true, play: None }
+            .encode()
     }
 
     /// Lines in the machine's own language.
@@ -268,6 +319,15 @@ impl Program {
         let line = |(row, text): (u64, &str)| Line { text: text.to_owned(), row, ..Line::default() };
         let lines = (1..).zip(text.split_inclusive('\n')).map(line).collect();
         Self { lines, first_row: 0, source: Source::Opaque }
+    }
+
+    /// On this machine: where its motors have backlash, a program of rows takes it up when it is resumed.
+    pub fn on_machine(mut self, machine: &Machine) -> Self {
+        if let Source::Table(table) = &mut self.source {
+            let start = table.start.map(|ticks| ticks as f64);
+            table.play = machine.has_backlash().then(|| Play::new(machine, start));
+        }
+        self
     }
 
     /// The same from row `row` on. `position` is where the machine reports to be, where the program depends on it.
@@ -452,6 +512,81 @@ mod tests {
         let program = Program::of_table(table(50), Arc::new(OnePeriod))?;
         let (tail, row) = program.stop_sequence(20);
         assert_eq!((tail.len(), tail[0].text.as_str(), row), (1, "lift", 20));
+        Ok(())
+    }
+
+    /// Any rows.
+    #[derive(Debug)]
+    struct AnyRows;
+
+    impl RowEncoder for AnyRows {
+        fn lines(
+            &self,
+            table: &TickTable,
+            _start: [i64; 2],
+            _resumed: bool,
+        ) -> Result<Vec<Line>, Unrepresentable> {
+            let lines = 1..table.rows.len() as u64;
+            Ok(lines.map(|row| Line { row, ..Line::default() }).collect())
+        }
+
+        fn lift(&self, _done: &[Line]) -> Vec<Line> {
+            Vec::new()
+        }
+    }
+
+    /// Wherever the motors stopped, and wherever the mechanism is in their play.
+    #[test]
+    fn resumed_plan_takes_up_the_backlash() -> Result<(), ProgramError> {
+        use drawing::Rect;
+        use kinematics::{Cartesian, MachineParts, Motor as MachineMotor};
+
+        let mut motors = ["a", "b"].map(|name| MachineMotor::new(name, 10.0, 400.0, 4000.0));
+        (motors[0].backlash_ticks, motors[1].backlash_ticks) = (30.0, 11.0);
+        let parts = MachineParts::new("loose", Cartesian, motors, Rect::new(0.0, 0.0, 100.0, 100.0));
+        let machine = Machine::new(parts).expect("a machine");
+        let mut table = table(200);
+        for (k, row) in table.rows.iter_mut().enumerate() {
+            // There and back, with the pen up now and then.
+            let k = k as i64;
+            row.ticks = [10 * (100 - (k - 100).abs()), 7 * (40 - (k % 80 - 40).abs())];
+            row.pen = u16::from(k % 50 > 5);
+        }
+        table.rows[0].ticks = [0, 0];
+        let start = [0.0, 0.0];
+        let mut loads = Vec::new();
+        let mut play = Play::new(&machine, start);
+        for row in &table.rows {
+            play.follow(row.ticks.map(|ticks| ticks as f64));
+            loads.push(play.loads());
+        }
+        let last = table.rows.len() - 1;
+        let program = Program::of_table(table, Arc::new(AnyRows))?.on_machine(&machine);
+        for row in [0, 1, 40, 90, 101, 103, 120, 160, 180] {
+            for position in [[0, 0], [700, 90], [-50, 300]] {
+                let resumed = program.from_row(row as u64, Some(position))?;
+                let rows = &resumed.table().expect("rows").rows;
+                for stood in [-0.5, 0.0, 0.5] {
+                    // The mechanism stands somewhere within the play.
+                    let at = position.map(|ticks| ticks as f64);
+                    let mut play = Play::new(&machine, [at[0] + stood * 30.0, at[1] + stood * 11.0]);
+                    let mut inked = false;
+                    for step in rows {
+                        play.follow(step.ticks.map(|ticks| ticks as f64));
+                        if step.pen != 0 && !inked {
+                            inked = true;
+                            let near = loads[row..].iter().any(|load| {
+                                (0..2).all(|motor| (load[motor] - play.loads()[motor]).abs() <= 0.51)
+                            });
+                            assert!(near, "row {row} from {position:?}, {stood}: {:?}", play.loads());
+                        }
+                    }
+                    assert!(inked, "there is ink after row {row}");
+                    let end = play.loads();
+                    assert!((0..2).all(|motor| (end[motor] - loads[last][motor]).abs() <= 0.51), "{end:?}");
+                }
+            }
+        }
         Ok(())
     }
 

@@ -16,6 +16,9 @@ const PAGE_POINTS: u32 = 9;
 /// Residuals beyond this many standard deviations of the pointing do not come from pointing.
 const TOO_LARGE: f64 = 5.0;
 
+/// A motor's backlash is free if it came to at least this many touches from either side.
+const FROM_EITHER_SIDE: usize = 3;
+
 /// A place on the sheet, and the ticks while the pen is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
@@ -23,6 +26,8 @@ pub struct Touch {
     pub place: Point,
     /// Positions of the motors, ticks.
     pub ticks: [f64; 2],
+    /// From where each motor came: 1 from lower ticks, -1 from higher ones, 0 if that is not known.
+    pub approach: [f64; 2],
     /// Whether the elbow was on the left, if that was written down.
     pub elbow_left: Option<bool>,
 }
@@ -188,6 +193,12 @@ fn groups(nominal: &Setup, data: &Measurements) -> Vec<Vec<Unknown>> {
         let is_linear = nominal.mechanism().is_ok_and(|mechanism| mechanism.is_linear());
         groups[0].retain(|unknown| !rigid.contains(unknown) && !is_linear);
     }
+    for motor in 0..2 {
+        let from = |side: f64| data.touches.iter().filter(|touch| touch.approach[motor] * side > 0.0).count();
+        if from(1.0).min(from(-1.0)) >= FROM_EITHER_SIDE {
+            groups[0].push(Unknown::Backlash(motor));
+        }
+    }
     groups
 }
 
@@ -341,11 +352,10 @@ pub fn fit(nominal: &Setup, data: &Measurements, options: &Options) -> Result<Fi
 /// Standard deviation of one equation from pointing and from rounding to ticks, mm.
 fn expected_mm(setup: &Setup, data: &Measurements, options: &Options) -> f64 {
     let Ok(model) = setup.model() else { return options.pointing_mm };
-    let touched = data.touches.iter().map(|touch| touch.ticks);
-    let all: Vec<f64> = touched
-        .chain(data.distances.iter().flat_map(|distance| distance.ticks))
-        .map(|ticks| model.rounding_mm(ticks))
-        .collect();
+    let touched = data.touches.iter().map(|touch| (touch.ticks, touch.approach));
+    let drawn = data.distances.iter().flat_map(|distance| distance.ticks).map(|ticks| (ticks, [0.0; 2]));
+    let all: Vec<f64> =
+        touched.chain(drawn).map(|(ticks, approach)| model.rounding_mm(ticks, approach)).collect();
     let square = all.iter().map(|mm| mm * mm).sum::<f64>() / all.len().max(1) as f64;
     (options.pointing_mm * options.pointing_mm + 0.5 * square).sqrt()
 }

@@ -8,6 +8,9 @@
 //! **Gauge.** Turning an arm about its base together with the sheet changes no measurement, so the
 //! sheet stays parallel to the machine's axes and the motors' offsets take the rotation.
 //!
+//! **Backlash.** A motor that came to a touch from lower ticks leads the mechanism by half its backlash, one that
+//! came from higher ticks by minus half of it. Where that is known of enough touches the backlash is free.
+//!
 //! **Order.** Unknowns are freed in groups ([`Setup::unknowns`]): the pose, then lengths and counts,
 //! then the belt ratio, as far as there are more measurements than unknowns and the condition of the
 //! scaled problem is at most [`LARGEST_CONDITION`].
@@ -33,6 +36,7 @@
 //!     coupling: [[1.0, 0.0], [0.0, -1.0]],
 //!     ticks_per_unit: [3200.0 / TAU; 2],
 //!     offset_ticks: [0.0, 800.0],
+//!     backlash_ticks: [0.0; 2],
 //!     corner: Point::new(12.7, 76.2),
 //!     sheet_mm: [215.9, 279.4],
 //! };
@@ -43,7 +47,7 @@
 //! let corners = [(0.0, 0.0), (215.9, 0.0), (215.9, 279.4), (0.0, 279.4)];
 //! let touches = corners.map(|(x, y)| {
 //!     let place = Point::new(x, y);
-//!     Touch { place, ticks: hidden.ticks(place, [0.0; 2]).unwrap(), elbow_left: None }
+//!     Touch { place, ticks: hidden.ticks(place, [0.0; 2]).unwrap(), approach: [0.0; 2], elbow_left: None }
 //! });
 //! let data = Measurements { touches: touches.into(), distances: Vec::new() };
 //! let found = fit(&arm, &data, &Options::default())?;

@@ -46,7 +46,7 @@ impl<'a> Problem<'a> {
         let model = self.model(parameters)?;
         let mut residuals = Vec::with_capacity(self.data.equations());
         for touch in &self.data.touches {
-            let off = model.pen(touch.ticks) - touch.place;
+            let off = model.touched(touch) - touch.place;
             residuals.extend([off.x, off.y]);
         }
         for distance in &self.data.distances {

@@ -8,6 +8,8 @@ use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
 use kinematics::{JointKind, JointPos, Mechanism};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::fit::Touch;
+
 /// A parameter of a mechanism, as machine files name it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Parameter {
@@ -32,6 +34,8 @@ pub struct Setup {
     pub ticks_per_unit: [f64; 2],
     /// Ticks where a row is 0.
     pub offset_ticks: [f64; 2],
+    /// Backlash of each motor, ticks.
+    pub backlash_ticks: [f64; 2],
     /// The lower-left corner of the sheet, machine mm.
     pub corner: Point,
     /// Width and height of the sheet, mm.
@@ -54,6 +58,8 @@ pub enum Unknown {
     Offset(usize),
     /// Ticks per unit of a motor.
     Counts(usize),
+    /// Backlash of a motor.
+    Backlash(usize),
     /// A length of the mechanism.
     Length(&'static str),
     /// Rotation of the sheet against the machine's axes, or the line of its bases.
@@ -73,6 +79,7 @@ pub(crate) struct Model {
     from_ticks: Matrix2<f64>,
     to_ticks: Matrix2<f64>,
     offset: Vector2<f64>,
+    backlash_ticks: [f64; 2],
     corner: Point,
 }
 
@@ -144,7 +151,14 @@ impl Setup {
         let from_ticks =
             to_ticks.try_inverse().ok_or_else(|| InvalidSetup("the coupling matrix is singular".into()))?;
         let offset = Vector2::from(self.offset_ticks);
-        Ok(Model { mechanism: self.mechanism()?, from_ticks, to_ticks, offset, corner: self.corner })
+        Ok(Model {
+            mechanism: self.mechanism()?,
+            from_ticks,
+            to_ticks,
+            offset,
+            backlash_ticks: self.backlash_ticks,
+            corner: self.corner,
+        })
     }
 
     /// The two points of the mechanism: bases or anchors.
@@ -208,13 +222,13 @@ impl Setup {
     pub(crate) fn scale(&self, unknown: Unknown, size_mm: f64) -> f64 {
         match unknown {
             Unknown::SheetX | Unknown::SheetY | Unknown::Length(_) | Unknown::Spread => 1.0,
-            Unknown::Offset(motor) if !self.is_revolute(motor) => 1.0,
+            Unknown::Offset(motor) | Unknown::Backlash(motor) if !self.is_revolute(motor) => 1.0,
             _ => 1.0 / size_mm,
         }
     }
 
-    /// Changes an unknown: lengths by mm, angles by rad, counts and ratios by a share. The offset of a
-    /// motor changes by rad or mm of its row.
+    /// Changes an unknown: lengths by mm, angles by rad, counts and ratios by a share. Offset and backlash of
+    /// a motor change by rad or mm of its row.
     pub(crate) fn change(&mut self, unknown: Unknown, by: f64) {
         let (sin, cos) = libm::sincos(by);
         match unknown {
@@ -222,6 +236,9 @@ impl Setup {
             Unknown::SheetY => self.corner.y += by,
             Unknown::Offset(motor) => self.offset_ticks[motor] += by * self.ticks_per_unit[motor].abs(),
             Unknown::Counts(motor) => self.ticks_per_unit[motor] *= 1.0 + by,
+            Unknown::Backlash(motor) => {
+                self.backlash_ticks[motor] += by * self.ticks_per_unit[motor].abs();
+            }
             Unknown::Length(key) => {
                 let length_mm = match self.geometry.get(key) {
                     Some(Parameter::Length(length_mm)) => *length_mm,
@@ -306,12 +323,24 @@ impl Model {
         Some([ticks.x, ticks.y])
     }
 
-    /// Half a tick either way on both motors, RMS, mm.
-    pub(crate) fn rounding_mm(&self, ticks: [f64; 2]) -> f64 {
+    /// Where the pen was at a touch: a motor that came to its ticks from below is half its backlash ahead of
+    /// the mechanism.
+    pub(crate) fn touched(&self, touch: &Touch) -> Point {
+        let load = [0, 1].map(|motor: usize| {
+            touch.ticks[motor] - 0.5 * self.backlash_ticks[motor] * touch.approach[motor]
+        });
+        self.pen(load)
+    }
+
+    /// Half a tick either way on both motors, and half the play of those whose `approach` is not known (0), RMS,
+    /// mm.
+    pub(crate) fn rounding_mm(&self, ticks: [f64; 2], approach: [f64; 2]) -> f64 {
         let q = self.joints(ticks);
         let of = |motor: usize| {
             let column = self.from_ticks.column(motor);
-            self.mechanism.pen_velocity(&q, &JointPos::new(column[0], column[1])).hypot2() / 12.0
+            let play = if approach[motor] == 0.0 { self.backlash_ticks[motor] } else { 0.0 };
+            let square = self.mechanism.pen_velocity(&q, &JointPos::new(column[0], column[1])).hypot2();
+            square * (1.0 + play * play) / 12.0
         };
         (of(0) + of(1)).sqrt()
     }

@@ -29,6 +29,7 @@ fn arm() -> Setup {
         coupling: [[1.0, 0.0], [0.0, -1.0]],
         ticks_per_unit: [3200.0 / TAU; 2],
         offset_ticks: [0.0, 800.0],
+        backlash_ticks: [0.0; 2],
         corner: Point::new(12.7, 76.2),
         sheet_mm: LETTER,
     }
@@ -53,6 +54,7 @@ fn five_bar() -> Setup {
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         ticks_per_unit: [3200.0 / TAU; 2],
         offset_ticks: [0.0; 2],
+        backlash_ticks: [0.0; 2],
         corner: Point::new(-74.0, 90.0),
         sheet_mm: [148.0, 105.0],
     }
@@ -68,6 +70,7 @@ fn polargraph() -> Setup {
         coupling: [[1.0, 0.0], [0.0, 1.0]],
         ticks_per_unit: [400.0 / 95.0; 2],
         offset_ticks: [0.0; 2],
+        backlash_ticks: [0.0; 2],
         corner: Point::new(176.5, -400.0),
         sheet_mm: [297.0, 210.0],
     }
@@ -80,6 +83,7 @@ fn corexy() -> Setup {
         coupling: [[1.0, 1.0], [1.0, -1.0]],
         ticks_per_unit: [92.03; 2],
         offset_ticks: [0.0; 2],
+        backlash_ticks: [0.0; 2],
         corner: Point::ZERO,
         sheet_mm: [200.0, 200.0],
     }
@@ -92,6 +96,7 @@ fn polar() -> Setup {
         coupling: [[-1.0, 0.0], [0.0, 1.0]],
         ticks_per_unit: [1856.0 / TAU * 2.0, 360.0 / 44.0],
         offset_ticks: [2400.0, -1129.0],
+        backlash_ticks: [0.0; 2],
         corner: Point::new(-60.0, 60.0),
         sheet_mm: [120.0, 60.0],
     }
@@ -133,7 +138,7 @@ fn touches(hidden: &Setup, places: &[Point], random: &mut Random) -> Vec<Touch> 
     let touch = |place: &Point| {
         let pointed = *place + 0.25 * Vec2::new(normal(random), normal(random));
         let ticks = hidden.ticks(pointed, near)?.map(f64::round);
-        Some(Touch { place: *place, ticks, elbow_left: None })
+        Some(Touch { place: *place, ticks, approach: [0.0; 2], elbow_left: None })
     };
     places.iter().map(touch).collect::<Option<_>>().expect("places within reach")
 }
@@ -237,8 +242,12 @@ fn exact_touches_find_hidden_parameters_of_every_mechanism() {
         let places = (0..each).map(|k| {
             Point::new(f64::from(k as u32 % 3) * width / 2.0, f64::from(k as u32 / 3) * height / 2.0)
         });
-        let touches =
-            places.map(|place| Touch { place, ticks: hidden.ticks(place, near).unwrap(), elbow_left: None });
+        let touches = places.map(|place| Touch {
+            place,
+            ticks: hidden.ticks(place, near).unwrap(),
+            approach: [0.0; 2],
+            elbow_left: None,
+        });
         let data = Measurements { touches: touches.collect(), distances: Vec::new() };
         let name = nominal.kind.name;
         let found =
@@ -317,6 +326,68 @@ fn touch_that_is_off_is_named() {
     let worst = fit.worst.expect("enough touches");
     assert_eq!(worst.touch, 5);
     assert!(worst.rms_mm < 0.6 && (worst.off_mm - 8.0).abs() < 1.5, "{worst:?}");
+}
+
+/// Corners and middle, each from both sides.
+fn touches_from_both_sides(hidden: &Setup, random: &mut Random) -> Vec<Touch> {
+    let [width, height] = LETTER;
+    let places = [corners(LETTER).to_vec(), vec![Point::new(0.5 * width, 0.5 * height)]].concat();
+    let sides = [[1.0, 1.0], [-1.0, -1.0]];
+    let each = sides.iter().flat_map(|approach| {
+        let mut all = touches(hidden, &places, random);
+        for touch in &mut all {
+            touch.approach = *approach;
+            for motor in 0..2 {
+                touch.ticks[motor] += (0.5 * approach[motor] * hidden.backlash_ticks[motor]).round();
+            }
+        }
+        all
+    });
+    each.collect()
+}
+
+/// 20 arms with up to 40 ticks of backlash, of which the machine file knows nothing.
+#[test]
+fn backlash_is_found_from_touches_from_both_sides() {
+    let mut random = seeded(12);
+    let (mut real, mut off) = (0.0, 0.0);
+    for _ in 0..20 {
+        let mut hidden = hidden(&mut random);
+        hidden.backlash_ticks = [0, 1].map(|_| 2.0 * random.between(5.0, 20.0).round());
+        let data =
+            Measurements { touches: touches_from_both_sides(&hidden, &mut random), distances: Vec::new() };
+        let fit = fit(&arm(), &data, &Options::default()).expect("a fit");
+        for motor in 0..2 {
+            let value = fit.values.iter().find(|value| value.unknown == Unknown::Backlash(motor));
+            let deviation = value.expect("a value").deviation * arm().ticks_per_unit[motor];
+            let error = fit.setup.backlash_ticks[motor] - hidden.backlash_ticks[motor];
+            off += error * error / deviation / deviation / 40.0;
+        }
+        real += page_error(&fit.setup, &hidden) / 20.0;
+    }
+    assert!((0.5..2.0).contains(&off.sqrt()), "{} standard deviations RMS", off.sqrt());
+    assert!(real.sqrt() <= 0.45, "{} mm RMS over the page", real.sqrt());
+}
+
+#[test]
+fn backlash_of_the_file_corrects_touches_or_counts_as_an_error() {
+    let mut random = seeded(13);
+    let mut hidden = hidden(&mut random);
+    hidden.backlash_ticks = [40.0, 40.0];
+    let nominal = Setup { backlash_ticks: [40.0, 40.0], ..arm() };
+    let mut touches = touches_from_both_sides(&hidden, &mut random);
+    // Too few from either side for an unknown.
+    touches.drain(2..8);
+    let data = Measurements { touches: touches.clone(), distances: Vec::new() };
+    let known = fit(&nominal, &data, &Options::default()).expect("a fit");
+    assert!(!known.is_bad && known.sigma_mm < 0.6, "{known:?}");
+    assert_eq!(known.setup.backlash_ticks, [40.0, 40.0]);
+    for touch in &mut touches {
+        touch.approach = [0.0; 2];
+    }
+    let data = Measurements { touches, distances: Vec::new() };
+    let unknown = fit(&nominal, &data, &Options::default()).expect("a fit");
+    assert!(unknown.sigma_mm > 2.0 * known.sigma_mm, "{} and {}", unknown.sigma_mm, known.sigma_mm);
 }
 
 /// Distances between marks alone give the fold of the elbow and the links, not the place of the sheet.

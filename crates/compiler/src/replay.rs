@@ -67,6 +67,19 @@ impl Motion {
     }
 }
 
+/// Where the mechanism is at each row, in the motors' ticks: on a machine with backlash, not where the motors are.
+pub fn loads(rows: &[Row], machine: &Machine) -> Vec<[f64; 2]> {
+    let mut play: Option<Play> = None;
+    rows.iter()
+        .map(|row| {
+            let ticks = row.ticks.map(|ticks| ticks as f64);
+            let play = play.get_or_insert_with(|| Play::new(machine, ticks));
+            play.follow(ticks);
+            play.loads()
+        })
+        .collect()
+}
+
 /// Where the mechanism goes while the pens draw `drawing`: strokes of pens with an offset are moved by it.
 pub fn on_carriage(drawing: Drawing, machine: &Machine) -> Drawing {
     moved(drawing, |pen| -machine.pen_offset_mm(pen.0))

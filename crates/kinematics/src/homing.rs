@@ -94,6 +94,11 @@ impl Homing {
         }
     }
 
+    /// Whether a move goes to a mechanical stop instead of a switch.
+    pub fn needs_stop(&self) -> bool {
+        self.moves().iter().any(|mv| mv.switch.is_none())
+    }
+
     /// The longest time that homing may take, s.
     pub fn longest_s(&self) -> f64 {
         self.moves().iter().map(HomingMove::longest_s).sum()

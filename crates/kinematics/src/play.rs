@@ -25,6 +25,11 @@ impl Play {
         Self { half, motors, loads: motors }
     }
 
+    /// The backlash of the motors, ticks.
+    pub fn backlash(&self) -> [f64; 2] {
+        self.half.map(|half| 2.0 * half)
+    }
+
     /// The positions of the loads, ticks.
     pub fn loads(&self) -> [f64; 2] {
         self.loads

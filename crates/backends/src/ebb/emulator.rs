@@ -6,7 +6,10 @@
 
 use std::collections::VecDeque;
 
+use kinematics::Play;
+
 use crate::device::{Device, Port};
+use crate::ink::Ink;
 
 /// Its receive buffer, bytes.
 const BUFFER: usize = 256;
@@ -44,15 +47,17 @@ pub(super) struct Ebb {
 
 impl Default for Ebb {
     fn default() -> Self {
-        Self::new()
+        Self::new(None)
     }
 }
 
 impl Ebb {
-    /// Switched on.
-    pub(super) fn new() -> Self {
+    /// Switched on, with motors that have this play.
+    pub(super) fn new(play: Option<Play>) -> Self {
+        let mut port = Port::new(BUFFER);
+        port.ink = Ink::through(play);
         Self {
-            port: Port::new(BUFFER),
+            port,
             fifo: VecDeque::new(),
             until_us: None,
             accumulators: [0; 2],

@@ -170,7 +170,8 @@ impl Encoder {
     }
 }
 
-/// The lines of a plan, in order.
+/// The lines of a plan, in order. With `continues` nothing goes before the rows, and the pen stays as it is
+/// before and after them.
 ///
 /// # Errors
 /// As [`Encoder::go`].
@@ -178,15 +179,15 @@ pub(super) fn lines(
     rows: impl IntoIterator<Item = Row>,
     moves: Moves,
     pen: Pen,
+    continues: bool,
 ) -> Result<Vec<Line>, Unrepresentable> {
+    let mut rows = rows.into_iter().peekable();
     let mut encoder = Encoder::new(moves, pen);
-    let mut lines: Vec<Line> = encoder
-        .start()
-        .into_iter()
-        .map(|text| Line { text, row: 0, duration_us: 0, ..Line::default() })
-        .collect();
+    let start = if continues { Vec::new() } else { encoder.start() };
+    let mut lines: Vec<Line> =
+        start.into_iter().map(|text| Line { text, row: 0, duration_us: 0, ..Line::default() }).collect();
     let mut before: Option<Row> = None;
-    let mut down = false;
+    let mut down = continues && rows.peek().is_some_and(|row| row.pen != 0);
     for (index, row) in (0..).zip(rows) {
         if let Some(last) = before {
             let duration_us = row.t_us - last.t_us;
@@ -213,7 +214,7 @@ pub(super) fn lines(
         }
         before = Some(row);
     }
-    if down {
+    if down && !continues {
         lines.push(Line {
             text: encoder.pen(false, 0),
             row: lines.last().map_or(0, |c| c.row),
@@ -234,7 +235,7 @@ pub(super) fn write<W: Write + ?Sized>(
     pen: Pen,
     out: &mut W,
 ) -> Result<(), WriteError> {
-    let lines = lines(rows, moves, pen)?;
+    let lines = lines(rows, moves, pen, false)?;
     let mut text = Text::new(out);
     for line in lines {
         text.str(&line.text).byte(b'\r').flush_if_full()?;

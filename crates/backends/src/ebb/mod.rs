@@ -52,7 +52,7 @@ impl Ebb {
             let (up, down) = positions.unwrap_or((16_000.0, 12_000.0));
             encode::Pen::Servo { up: up.max(0.0) as u16, down: down.max(0.0) as u16, pin: 4 }
         };
-        EbbEncoder { moves, pen }
+        EbbEncoder { moves, pen, continues: false }
     }
 }
 
@@ -102,7 +102,7 @@ impl Backend for Ebb {
         options: &EncodeOptions,
         out: &mut dyn Write,
     ) -> Result<(), WriteError> {
-        let EbbEncoder { moves, pen } = self.encoder(plan, *options);
+        let EbbEncoder { moves, pen, .. } = self.encoder(plan, *options);
         encode::write(plan.rows(), moves, pen, out)
     }
 
@@ -118,6 +118,16 @@ impl Backend for Ebb {
         Ok(Program::of_lines(vec![line], Arc::new(PenOnly { lift: pen.line(false, LIFT_MS) })))
     }
 
+    fn continuing_program(
+        &self,
+        plan: &PlanSource<'_>,
+        options: &EncodeOptions,
+        start: [i64; 2],
+    ) -> Result<Program, ProgramError> {
+        let encoder = EbbEncoder { continues: true, ..self.encoder(plan, *options) };
+        Program::continuing(plan.table(), Arc::new(encoder), start)
+    }
+
     fn session(&self, program: Program, _options: &SessionOptions) -> Option<Box<dyn Session>> {
         // The board's answers to queries cannot be told from those to lines: one line at a time.
         Some(Box::new(CharacterCounting::new(program, self.status()?, 0)))
@@ -127,8 +137,8 @@ impl Backend for Ebb {
         Some(Box::new(status::EbbStatus::default()))
     }
 
-    fn emulator(&self, _options: &EmulatorOptions) -> Option<Box<dyn Device>> {
-        Some(Box::new(emulator::Ebb::new()))
+    fn emulator(&self, options: &EmulatorOptions) -> Option<Box<dyn Device>> {
+        Some(Box::new(emulator::Ebb::new(options.play)))
     }
 
     fn ink_frame(&self) -> InkFrame {
@@ -157,11 +167,13 @@ impl LineLanguage for PenOnly {
 struct EbbEncoder {
     moves: encode::Moves,
     pen: encode::Pen,
+    /// Whether the rows go on from where the board stands, with the pen as it is.
+    continues: bool,
 }
 
 impl RowEncoder for EbbEncoder {
     fn lines(&self, table: &TickTable, start: [i64; 2], resumed: bool) -> Result<Vec<Line>, Unrepresentable> {
-        let mut lines = encode::lines(table.rows.iter().copied(), self.moves, self.pen)?;
+        let mut lines = encode::lines(table.rows.iter().copied(), self.moves, self.pen, self.continues)?;
         if resumed {
             // `EM` would clear the counters.
             lines.retain(|line| !line.text.starts_with("EM"));

@@ -91,14 +91,18 @@ impl Program<'_> {
     }
 
     fn start(&mut self) {
-        // Millimetres, absolute; arcs in the plane of the paper.
+        self.modes();
+        self.pen(false);
+    }
+
+    /// Millimetres, absolute; arcs in the plane of the paper.
+    fn modes(&mut self) {
         for text in ["G21", "G90", "G17"] {
             self.push(text.to_owned(), 0.0);
         }
         if self.options.flavour != Flavour::Klipper {
             self.push("G94".to_owned(), 0.0);
         }
-        self.pen(false);
     }
 
     fn pen(&mut self, down: bool) {
@@ -341,6 +345,29 @@ pub(super) fn timed(
     // Lines after the last row belong to it.
     for line in &mut program.lines[done..] {
         line.row = last;
+    }
+    program.lines
+}
+
+/// The lines for rows that go on from where the machine stands, each with a feed; the pen stays as it is.
+pub(super) fn continued(setpoints: impl IntoIterator<Item = Setpoint>, options: &Options) -> Vec<Line> {
+    let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
+    program.modes();
+    let mut sent_us = 0;
+    for (index, setpoint) in (0_u64..).zip(setpoints) {
+        let first = program.lines.len();
+        match program.here {
+            None => program.here = Some(setpoint.at),
+            Some(from) if !same(program.here, setpoint.at) => {
+                let duration_s = (setpoint.row.t_us - sent_us) as f64 * 1e-6;
+                sent_us = setpoint.row.t_us;
+                program.line(setpoint.at, from.distance(setpoint.at).max(1e-3) / duration_s.max(1e-6));
+            }
+            Some(_) => {}
+        }
+        for line in &mut program.lines[first..] {
+            line.row = index;
+        }
     }
     program.lines
 }

@@ -13,7 +13,8 @@ use std::io::Write;
 use kinematics::Machine;
 
 use crate::backend::{
-    Backend, EmulatorOptions, EncodeOptions, InkFrame, PenActuator, PenNumbers, PlanSource, SessionOptions,
+    Backend, EmulatorOptions, EncodeOptions, InkFrame, Loss, PenActuator, PenNumbers, PlanSource,
+    SessionOptions,
 };
 use crate::device::Device;
 use crate::homing::HomingSteps;
@@ -105,6 +106,16 @@ impl Backend for Paths {
         PenNumbers::Pause
     }
 
+    fn file_caveat(&self, machine: &Machine) -> Option<Loss> {
+        machine.has_backlash().then(|| {
+            Loss::Caveat(format!(
+                "the firmware plans the motion along these paths, so the backlash of the machine file is not \
+                 compensated; gcode-timed and `send --protocol gcode` are{}",
+                if self.0 == Flavour::Marlin { ", and Marlin has its own compensation (M425)" } else { "" }
+            ))
+        })
+    }
+
     fn needs_machine(&self) -> bool {
         true
     }
@@ -138,6 +149,17 @@ impl Backend for Paths {
         let options = options(self.0, self.name(), plan, *encode)?;
         let lines = encode::pen(&options, down);
         Ok(program::pen_only(lines, &encode::pen(&options, false)))
+    }
+
+    fn continuing_program(
+        &self,
+        plan: &PlanSource<'_>,
+        encode: &EncodeOptions,
+        _start: [i64; 2],
+    ) -> Result<Program, ProgramError> {
+        let options = options(self.0, self.name(), plan, *encode)?;
+        let lines = encode::continued(plan.setpoints(self.name())?, &options);
+        Ok(program::continuing(lines, &encode::pen(&options, false)))
     }
 
     fn parse_program(&self, file: &[u8]) -> Option<Program> {

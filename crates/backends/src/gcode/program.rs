@@ -16,6 +16,17 @@ pub(super) const PAUSE: &str = "M0";
 
 /// A program of lines as [`super::encode`] makes them.
 pub(super) fn program(lines: impl IntoIterator<Item = Line>) -> Program {
+    let (program, lift) = with_positions(lines);
+    Program::of_lines(program, Arc::new(Gcode { lift }))
+}
+
+/// The same for lines that go on from where the machine stands; `lift` are the lines that lift the pen.
+pub(super) fn continuing(lines: Vec<Line>, lift: &[Line]) -> Program {
+    pen_only(with_positions(lines).0, lift)
+}
+
+/// Lines with the positions that they lead to, comments apart, and those of them that lift the pen at the start.
+fn with_positions(lines: impl IntoIterator<Item = Line>) -> (Vec<Line>, Vec<String>) {
     let mut state = ModalState::default();
     let mut lift: Vec<String> = Vec::new();
     let mut program: Vec<Line> = Vec::new();
@@ -32,7 +43,7 @@ pub(super) fn program(lines: impl IntoIterator<Item = Line>) -> Program {
         }
         program.push(Line { position: moved.then_some(state.position_um), ..line });
     }
-    Program::of_lines(program, Arc::new(Gcode { lift }))
+    (program, lift)
 }
 
 /// A program that only moves the pen.

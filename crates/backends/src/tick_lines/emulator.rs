@@ -7,6 +7,7 @@ use super::framing::{framed, unframed};
 use crate::backend::EmulatorOptions;
 use crate::device::{Device, Port};
 use crate::homing::{Datum, EmulatedHoming};
+use crate::ink::Ink;
 
 /// Its receive buffer unless another size is asked for, bytes.
 const BUFFER: usize = 512;
@@ -50,8 +51,10 @@ impl TickLineReader {
         let datum = Datum::at_start(options.homing, options.homed);
         let position = options.start.filter(|_| datum == Datum::Known);
         let buffer = options.buffer.unwrap_or(BUFFER);
+        let mut port = Port::new(buffer);
+        port.ink = Ink::through(options.play);
         Self {
-            port: Port::new(buffer),
+            port,
             // One byte is kept free, as in a ring.
             announced: options.announces_room.then_some(buffer.saturating_sub(1)),
             queue: VecDeque::new(),
@@ -136,7 +139,7 @@ impl TickLineReader {
     }
 
     fn has_switches(&self) -> bool {
-        self.homing.is_some_and(|homing| homing.moves_us[0].is_some())
+        self.homing.is_some_and(|homing| homing.moves_us[0].is_some() && !homing.needs_stop)
     }
 
     /// The answer to `home`.
@@ -148,7 +151,7 @@ impl TickLineReader {
             return "error moving";
         }
         let now_us = self.now_us;
-        if !self.datum.begin(self.homing, now_us) {
+        if !self.has_switches() || !self.datum.begin(self.homing, now_us) {
             return "error no switches";
         }
         (self.position, self.planned, self.next) = (None, None, 0);

@@ -90,6 +90,15 @@ impl Backend for Answered {
         program(plan)
     }
 
+    fn continuing_program(
+        &self,
+        plan: &PlanSource<'_>,
+        _options: &EncodeOptions,
+        start: [i64; 2],
+    ) -> Result<Program, ProgramError> {
+        Program::continuing(plan.table(), Arc::new(TickLineEncoder), start)
+    }
+
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
         let machine = program.table().map(|table| table.header.machine.clone()).unwrap_or_default();
         let framing = Box::new(framing::TickLineFraming::for_machine(&machine));
@@ -101,8 +110,8 @@ impl Backend for Answered {
     }
 
     fn homing(&self, machine: &Machine) -> Option<HomingSteps> {
-        let moves = machine.parts().homing.as_ref()?.moves();
-        (!moves.is_empty()).then(framing::homing)
+        let homing = machine.parts().homing.as_ref()?;
+        (!homing.moves().is_empty() && !homing.needs_stop()).then(framing::homing)
     }
 
     fn knows_datum(&self) -> bool {

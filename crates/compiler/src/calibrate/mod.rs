@@ -21,6 +21,7 @@ pub fn setup(file: &MachineFile, machine: &Machine) -> Option<Setup> {
         coupling: parts.coupling,
         ticks_per_unit: parts.motors.each_ref().map(|motor| motor.ticks_per_unit),
         offset_ticks: parts.motors.each_ref().map(|motor| motor.offset_ticks),
+        backlash_ticks: parts.motors.each_ref().map(|motor| motor.backlash_ticks),
         corner: drawing::Point::new(parts.sheet.x0, parts.sheet.y0),
         sheet_mm: [parts.sheet.width(), parts.sheet.height()],
     })

@@ -36,7 +36,20 @@ fn number(row: &Row<'_>, column: usize, what: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("line {line}: {what} is not a number: {cell}"))
 }
 
-/// Touches: `x_mm,y_mm,MOTOR1,MOTOR2[,elbow]`, in this order or as a heading names the columns. With
+/// The columns that state from where each motor came.
+const APPROACH: [&str; 2] = ["approach1", "approach2"];
+
+/// The side from which a motor came to a touch: `+` from lower ticks, `-` from higher ones, or nothing.
+fn approach(row: &Row<'_>, column: Option<usize>) -> Result<f64, String> {
+    match column.and_then(|column| row.1.get(column)).copied() {
+        None | Some("") => Ok(0.0),
+        Some("+") => Ok(1.0),
+        Some("-") => Ok(-1.0),
+        Some(other) => Err(format!("line {}: a motor comes from + or -, not {other}", row.0)),
+    }
+}
+
+/// Touches: `x_mm,y_mm,MOTOR1,MOTOR2[,elbow,approach1,approach2]`, in this order or as a heading names the columns. With
 /// `corners`, places are left out: they are the corners in the order of [`CORNER_NAMES`], again from the
 /// first one after the fourth.
 ///
@@ -49,8 +62,8 @@ pub fn read_touches(
 ) -> Result<Vec<Touch>, String> {
     let (heading, rows) = rows(text);
     let usual = match corners {
-        Some(_) => vec![motors[0], motors[1], "elbow"],
-        None => vec!["x_mm", "y_mm", motors[0], motors[1], "elbow"],
+        Some(_) => vec![motors[0], motors[1], "elbow", APPROACH[0], APPROACH[1]],
+        None => vec!["x_mm", "y_mm", motors[0], motors[1], "elbow", APPROACH[0], APPROACH[1]],
     };
     let names = heading.unwrap_or_else(|| usual.iter().map(|name| (*name).to_owned()).collect());
     if let Some(unknown) = names.iter().find(|name| !usual.contains(&name.as_str())) {
@@ -62,6 +75,7 @@ pub fn read_touches(
     };
     let ticks = [column(motors[0])?, column(motors[1])?];
     let elbow = column("elbow").ok();
+    let approaches = APPROACH.map(|name| column(name).ok());
     let place = if corners.is_some() { None } else { Some([column("x_mm")?, column("y_mm")?]) };
     if let (Some(_), false) = (corners, rows.len().is_multiple_of(4)) {
         return Err(format!("there are {} touches: four corners make four, or a multiple of it", rows.len()));
@@ -74,6 +88,7 @@ pub fn read_touches(
                 (None, None) => unreachable!("places are given or corners"),
             },
             ticks: [number(row, ticks[0], motors[0])?, number(row, ticks[1], motors[1])?],
+            approach: [approach(row, approaches[0])?, approach(row, approaches[1])?],
             elbow_left: match elbow.and_then(|column| row.1.get(column)).copied() {
                 None | Some("") => None,
                 Some("left" | "l") => Some(true),
@@ -94,7 +109,7 @@ pub fn read_drawn(text: &str, marks: &Marks) -> Result<Vec<Touch>, String> {
     let (_, rows) = rows(text);
     let touch = |row: &Row<'_>| {
         let place = Point::new(number(row, 1, "x_mm")?, number(row, 2, "y_mm")?);
-        Ok(Touch { place, ticks: mark(row, 0, marks)?, elbow_left: None })
+        Ok(Touch { place, ticks: mark(row, 0, marks)?, approach: [0.0; 2], elbow_left: None })
     };
     rows.iter().map(touch).collect()
 }
@@ -130,6 +145,11 @@ mod tests {
         let named = "arm2,arm1,y_mm,x_mm,elbow\n-3.5,800,2,1,\n8,7,6,5,right";
         assert_eq!(read_touches(named, motors, None).unwrap(), plain);
         assert_eq!(plain[1].elbow_left, Some(false));
+        let sides =
+            read_touches("x_mm,y_mm,arm1,arm2,approach1,approach2\n1,2,3,4,+,\n1,2,3,4,-,+", motors, None);
+        let sides: Vec<[f64; 2]> = sides.unwrap().iter().map(|touch| touch.approach).collect();
+        assert_eq!(sides, [[1.0, 0.0], [-1.0, 1.0]]);
+        assert!(read_touches("1,2,3,4,left,up", motors, None).unwrap_err().contains("+ or -"));
         let four = read_touches("1,2\n3,4\n5,6\n7,8", motors, Some(corners([10.0, 20.0]))).unwrap();
         assert_eq!((four[2].place, four[2].ticks), (Point::new(10.0, 20.0), [5.0, 6.0]));
     }
@@ -139,7 +159,10 @@ mod tests {
         let read = |text| read_touches(text, ["a", "b"], None).unwrap_err();
         assert_eq!(read("1,2,3,4\n1,2,3"), "line 2: b is missing");
         assert_eq!(read("1,2,3,x"), "line 1: b is not a number: x");
-        assert_eq!(read("x_mm,y_mm,a,c\n1,2,3,4"), "unknown column c; expected x_mm, y_mm, a, b, elbow");
+        assert_eq!(
+            read("x_mm,y_mm,a,c\n1,2,3,4"),
+            "unknown column c; expected x_mm, y_mm, a, b, elbow, approach1, approach2"
+        );
         let corners = Some(corners([1.0, 1.0]));
         assert!(
             read_touches("1,2\n3,4", ["a", "b"], corners).unwrap_err().starts_with("there are 2 touches")

@@ -108,6 +108,10 @@ fn motors(
         if before.offset_ticks[motor] != after.offset_ticks[motor] {
             set(table, "offset", number(after.offset_ticks[motor], 3));
         }
+        if before.backlash_ticks[motor] != after.backlash_ticks[motor] {
+            // Errors of pointing may make a small one negative.
+            set(table, "backlash", number(after.backlash_ticks[motor].max(0.0), 2));
+        }
         if before.ticks_per_unit[motor] != after.ticks_per_unit[motor] {
             let first = usize::from(after.coupling[motor][0] == 0.0);
             let counts = match machine.mechanism().joint_kinds()[first] {

@@ -83,6 +83,9 @@ fn named(unknown: Unknown, setup: &Setup, motors: [&str; 2]) -> (String, &'stati
         Unknown::Counts(motor) => {
             (format!("counts of {}", motors[motor]), "ticks/mm", setup.ticks_per_unit[motor])
         }
+        Unknown::Backlash(motor) => {
+            (format!("backlash of {}", motors[motor]), "ticks", setup.backlash_ticks[motor])
+        }
         Unknown::Length(key) => match setup.geometry.get(key) {
             Some(::calibration::Parameter::Length(mm)) => (key.into(), "mm", *mm),
             _ => (key.into(), "mm", 0.0),
@@ -99,7 +102,7 @@ fn found(value: &Value, before: &Setup, after: &Setup, motors: [&str; 2]) -> (f6
     match value.unknown {
         Unknown::Turn | Unknown::Skew => (value.change.to_degrees(), 1.0_f64.to_degrees()),
         Unknown::Belt => (1.0 + value.change, 1.0),
-        Unknown::Offset(motor) | Unknown::Counts(motor) => {
+        Unknown::Offset(motor) | Unknown::Counts(motor) | Unknown::Backlash(motor) => {
             (named(value.unknown, after, motors).2, before.ticks_per_unit[motor].abs())
         }
         _ => (named(value.unknown, after, motors).2, 1.0),

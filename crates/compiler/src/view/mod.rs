@@ -354,12 +354,16 @@ fn machine(machine: &Machine) -> Value {
         json!({ "name": name, "kind": kind })
     });
     let motors = machine.motors().iter().map(|motor| {
-        json!({
+        let mut found = json!({
             "name": motor.name,
             "speed": motor.max_speed_ticks_s,
             "acceleration": motor.max_acceleration_ticks_s2,
             "jerk": motor.max_jerk_ticks_s3,
-        })
+        });
+        if motor.backlash_ticks > 0.0 {
+            found["backlash"] = motor.backlash_ticks.into();
+        }
+        found
     });
     let linkage = mechanism.linkage(sheet);
     let affine = |f: &JointAffine| json!([f.constant, f.factors[0], f.factors[1]]);

@@ -5,6 +5,7 @@ use drawing::{Point, distance};
 use kinematics::{Machine, MotorPos};
 
 use super::View;
+use crate::replay;
 
 /// Positions in whole ticks are differenced over a number of rows at which their rounding changes the
 /// acceleration by at most this share of its limit.
@@ -36,6 +37,12 @@ impl Motion {
             Some(exact) => exact.to_vec(),
             None => rows.iter().map(|row| row.ticks.map(|ticks| ticks as f64)).collect(),
         };
+        let loads = replay::loads(rows, view.machine);
+        let lags: Vec<[f64; 2]> = rows
+            .iter()
+            .zip(&loads)
+            .map(|(row, load)| [0, 1].map(|motor| load[motor] - row.ticks[motor] as f64))
+            .collect();
         let mut motion = Self {
             pen_mm_s: vec![0.0; rows.len()],
             limits: vec![("the pen's speed".to_owned(), vec![0.0; rows.len()])],
@@ -54,17 +61,19 @@ impl Motion {
                 end == rows.len() || 2 * (rows[end].t_us - rows[end - 1].t_us) > 3 * header.period_us;
             if is_rest {
                 let span = Span { first: start, last: end - 1, stride, step_s: stride as f64 * period_s };
-                motion.span(view, &positions, &span);
+                motion.span(view, &positions, &lags, &span);
                 start = end;
             }
         }
         motion
     }
 
-    fn span(&mut self, view: &View<'_>, positions: &[[f64; 2]], span: &Span) {
+    fn span(&mut self, view: &View<'_>, positions: &[[f64; 2]], lags: &[[f64; 2]], span: &Span) {
+        let pen_at =
+            |row: usize| place(view.machine, [0, 1].map(|motor| positions[row][motor] + lags[row][motor]));
         for row in span.first..span.last {
             let [more, before, here, after] = [-2, -1, 0, 1].map(|k| positions[span.at(row, k)]);
-            let pen_mm_s = distance(place(view.machine, here), place(view.machine, after)) / span.step_s;
+            let pen_mm_s = distance(pen_at(span.at(row, 0)), pen_at(span.at(row, 1))) / span.step_s;
             self.pen_mm_s[row] = pen_mm_s;
             let mut shares = vec![pen_mm_s / view.pen_speed_mm_s(view.rows[row].pen)];
             for (k, motor) in view.header.motors.iter().enumerate() {

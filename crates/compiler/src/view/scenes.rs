@@ -83,7 +83,7 @@ impl View<'_> {
         if let Some(at_s) = at_s {
             let ahead = replay::Motion::of(&self.rows[until..], self.machine, CHORD_MM).ink;
             scene.overlay.ahead = ahead.into_iter().map(|line| line.points).collect();
-            scene.overlay.machine = Some(self.pose(at_s));
+            scene.overlay.machine = Some(self.pose(&replay::loads(self.rows, self.machine), at_s));
         }
         Ok(scene)
     }
@@ -94,22 +94,22 @@ impl View<'_> {
         self.rows.partition_point(|row| row.t_us <= t_us).saturating_sub(1)
     }
 
-    /// Motor positions at a time, ticks.
-    fn motors_at(&self, at_s: f64) -> MotorPos {
+    /// Where the mechanism is at a time, in the motors' ticks.
+    fn loads_at(&self, loads: &[[f64; 2]], at_s: f64) -> MotorPos {
         let row = self.row_at(at_s);
         let next = (row + 1).min(self.rows.len() - 1);
         let [from, to] = [self.rows[row], self.rows[next]];
         let span_s = (to.t_us - from.t_us) as f64 * 1e-6;
         let share =
             if span_s > 0.0 { ((at_s - from.t_us as f64 * 1e-6) / span_s).clamp(0.0, 1.0) } else { 0.0 };
-        let [from, to] = [from, to].map(|row| MotorPos(row.ticks.map(|ticks| ticks as f64)));
+        let [from, to] = [row, next].map(|row| MotorPos(loads[row]));
         from + share * (to - from)
     }
 
     /// The machine at a time.
-    fn pose(&self, at_s: f64) -> MachinePose {
+    fn pose(&self, loads: &[[f64; 2]], at_s: f64) -> MachinePose {
         let linkage = self.machine.mechanism().linkage(self.machine.sheet());
-        let points = linkage.points(&self.machine.joint_positions(&self.motors_at(at_s)));
+        let points = linkage.points(&self.machine.joint_positions(&self.loads_at(loads, at_s)));
         let ends = |kind| {
             let parts = linkage.parts.iter().filter(move |part| part.kind == kind);
             parts.map(|part| [points[part.from], points[part.to]]).collect::<Vec<_>>()
@@ -169,9 +169,8 @@ impl View<'_> {
 
     /// Ink up to a row: rows of one colour in turn are one line.
     fn lines(&self, until: usize, color: impl Fn(usize) -> Colour) -> Vec<ColoredLine> {
-        let place = |row: usize| {
-            self.machine.forward_from_motors(&MotorPos(self.rows[row].ticks.map(|ticks| ticks as f64)))
-        };
+        let loads = replay::loads(self.rows, self.machine);
+        let place = |row: usize| self.machine.forward_from_motors(&MotorPos(loads[row]));
         let mut lines: Vec<ColoredLine> = Vec::new();
         let mut continues = false;
         for row in 0..until {
@@ -205,10 +204,11 @@ impl View<'_> {
         let title = format!("{} on {}", self.title, self.machine.name());
         let mut scene = scene::of_plan(&title, &[], self.machine, self.header.pen_colors.clone());
         scene.start = None;
+        let loads = replay::loads(self.rows, self.machine);
         let duration_s = self.header.duration_us as f64 * 1e-6;
         let count = (turn_s * POSES_A_SECOND).clamp(2.0, 2000.0) as usize;
         let poses: Vec<MachinePose> =
-            (0..=count).map(|k| self.pose(duration_s * k as f64 / count as f64)).collect();
+            (0..=count).map(|k| self.pose(&loads, duration_s * k as f64 / count as f64)).collect();
         let each = |of: fn(&MachinePose) -> &Vec<[Point; 2]>| {
             (0..of(&poses[0]).len()).map(|part| poses.iter().map(|pose| of(pose)[part]).collect()).collect()
         };
@@ -219,17 +219,15 @@ impl View<'_> {
             links: each(|pose| &pose.links),
             pivots: pivots.collect(),
             pen: poses.iter().map(|pose| pose.pen).collect(),
-            strokes: self.animated_strokes(duration_s / (turn_s * POSES_A_SECOND)),
+            strokes: self.animated_strokes(&loads, duration_s / (turn_s * POSES_A_SECOND)),
         };
         (scene, animation)
     }
 
     /// Every stroke with its progress in steps of about `step_s`.
-    fn animated_strokes(&self, step_s: f64) -> Vec<AnimatedStroke> {
+    fn animated_strokes(&self, loads: &[[f64; 2]], step_s: f64) -> Vec<AnimatedStroke> {
         let share = |row: usize| self.rows[row].t_us as f64 / self.header.duration_us.max(1) as f64;
-        let place = |row: usize| {
-            self.machine.forward_from_motors(&MotorPos(self.rows[row].ticks.map(|ticks| ticks as f64)))
-        };
+        let place = |row: usize| self.machine.forward_from_motors(&MotorPos(loads[row]));
         trace::pen_downs(self.rows)
             .into_iter()
             .map(|(first, last)| {

@@ -6,6 +6,8 @@ use drawing::{Drawing, Line, Point, Segment, Span, Stroke, distance, distance_to
 use kinematics::{Machine, MotorPos};
 use plan::Row;
 
+use crate::replay;
+
 /// Chords of curves deviate from them by at most this, mm.
 const CHORD_MM: f64 = 0.002;
 /// Beside the way between two rows, this much of the stroke is searched for the nearest place, mm.
@@ -40,12 +42,13 @@ pub(super) fn trace(rows: &[Row], machine: &Machine, drawn: &Drawing, placed: &D
     let is_joined = drawn.strokes.len() != placed.strokes.len();
     let sources = if is_joined { sources(placed) } else { BTreeMap::new() };
     let mut traced = Traced { deviation_mm: vec![0.0; rows.len()], pieces: Vec::new() };
+    let loads = replay::loads(rows, machine);
     for ((first, last), stroke) in runs.into_iter().zip(&drawn.strokes) {
         let chords = chords(stroke, &sources);
         let mut place = Place::default();
         let mut before: Option<Point> = None;
-        for (row, Row { ticks, .. }) in rows.iter().enumerate().take(last + 1).skip(first) {
-            let at = machine.forward_from_motors(&MotorPos(ticks.map(|ticks| ticks as f64)));
+        for (row, load) in loads.iter().enumerate().take(last + 1).skip(first) {
+            let at = machine.forward_from_motors(&MotorPos(*load));
             place = nearest(&chords, at, place, before.map_or(0.0, |before| distance(before, at)));
             before = Some(at);
             traced.deviation_mm[row] = place.distance_mm;

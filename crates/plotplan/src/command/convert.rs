@@ -7,7 +7,7 @@ mod names;
 use std::collections::BTreeSet;
 
 use backends::pen_plotter::plotter::Plotter;
-use backends::{Backend, PlanSource, RowIter, WriteError};
+use backends::{Backend, Loss, PlanSource, RowIter, WriteError};
 use compiler::import::Page;
 use compiler::layout::Layout;
 use compiler::pipeline::{self, Compiled, Order, Request};
@@ -256,7 +256,8 @@ fn write_encoded(
 ) -> Result<(), Failure> {
     backend.check(machine).map_err(|error| Failure::Drawing(error.into()))?;
     let pens: Vec<u16> = compiled.ordered().pens().into_iter().map(|pen| pen.0).collect();
-    let losses = backend.losses(&compiled.header, &pens);
+    let losses: Vec<Loss> =
+        backend.losses(&compiled.header, &pens).into_iter().chain(backend.file_caveat(machine)).collect();
     for loss in &losses {
         terminal::warning(Code::FormatLoss, &loss.to_string());
     }

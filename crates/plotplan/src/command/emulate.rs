@@ -10,7 +10,7 @@ use backends::homing::EmulatedHoming;
 use backends::{Device, EmulatorOptions, Fault, FaultInjector, InkFrame};
 use compiler::report::Code;
 use drawing::{Point, Rect};
-use kinematics::MotorPos;
+use kinematics::{MotorPos, Play};
 use picture::{Ink, InkLine, Scene};
 
 use crate::cli::Emulate;
@@ -52,6 +52,7 @@ pub(crate) fn run(arguments: &Emulate) -> Result<(), Failure> {
 fn device(arguments: &Emulate, machine: Option<&LoadedMachine>) -> Result<Box<dyn Device>, Failure> {
     let options = EmulatorOptions {
         start: machine.map(start_ticks),
+        play: machine.and_then(|machine| play(arguments, machine)),
         homed: arguments.homed,
         homing: machine.and_then(|machine| machine.machine.parts().homing.as_ref()).map(|homing| {
             let switch = arguments.fault.iter().find_map(|fault| match fault {
@@ -72,6 +73,16 @@ fn device(arguments: &Emulate, machine: Option<&LoadedMachine>) -> Result<Box<dy
 fn start_ticks(machine: &LoadedMachine) -> [i64; 2] {
     let ticks = machine.machine.motor_positions(&machine.machine.start());
     [ticks[0].round() as i64, ticks[1].round() as i64]
+}
+
+/// The play of the motors of a machine with backlash, in the frame of its ink.
+fn play(arguments: &Emulate, machine: &LoadedMachine) -> Option<Play> {
+    let at = match arguments.protocol.0.ink_frame() {
+        InkFrame::Ticks => start_ticks(machine).map(|ticks| ticks as f64),
+        InkFrame::TicksFromStart => [0.0; 2],
+        InkFrame::Millimetres(_) | InkFrame::PlotterUnits => return None,
+    };
+    machine.machine.has_backlash().then(|| Play::new(&machine.machine, at))
 }
 
 /// The clock that the emulated machine runs by.

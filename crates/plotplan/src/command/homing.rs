@@ -43,8 +43,10 @@ pub(super) fn ensure(
             }
             HomingMethod::Moves(_) => {
                 let steps = backend.homing(machine).ok_or_else(|| {
-                    let what = "--home: this protocol cannot home; home the machine by other means and give --assume-homed";
-                    Failure::Usage(anyhow!(what))
+                    let what = if homing.needs_stop() { "home to a mechanical stop" } else { "home" };
+                    Failure::Usage(anyhow!(
+                        "--home: this protocol cannot {what}; home the machine by other means and give --assume-homed"
+                    ))
                 })?;
                 terminal::say("homing\n");
                 wire.home(HomingRun::new(steps, homing))?;

@@ -3,8 +3,10 @@
 //! A jog is a travel of one row that is sent as `send` sends a resumed plan: from where the machine reports to
 //! be, within its limits, pen up. So it works with every controller that reports its position.
 
+mod canvas;
 mod command;
 mod screen;
+mod sketch;
 
 use std::fs;
 use std::io::{BufRead as _, Write as _};
@@ -12,14 +14,16 @@ use std::io::{BufRead as _, Write as _};
 use anyhow::{Context as _, anyhow};
 use backends::homing::HomingRun;
 use backends::{
-    Backend, EncodeOptions, InkFrame, Outcome, PlanSource, Program, ReportedPosition, RowIter, SessionOptions,
+    Backend, EncodeOptions, InkFrame, Outcome, PlanSource, Program, ProgramError, ReportedPosition, RowIter,
+    SessionOptions,
 };
 use drawing::{Line, Point, Segment, Vec2};
-use kinematics::{JointPos, Machine, MotorPos};
+use kinematics::{JointPos, Machine, MotorPos, Play};
 use plan::{Header, Rounding, Row};
 use serialport::FlowControl;
 
 use self::command::JogCommand;
+use self::sketch::{Sketch, Stylus};
 use super::homing;
 use crate::cli::Jog;
 use crate::failure::Failure;
@@ -31,6 +35,8 @@ use crate::{machines, output};
 const LEAST_US: u64 = 1_000_000;
 /// Poses along a travel that are checked against the limits of the joints.
 const SAMPLES: u32 = 64;
+/// Lines of a script are drawn within this, mm.
+const SCRIPT_TOLERANCE_MM: f64 = 0.1;
 
 pub(crate) fn run(arguments: &Jog) -> Result<(), Failure> {
     let backend = arguments.protocol.0;
@@ -46,12 +52,15 @@ pub(crate) fn run(arguments: &Jog) -> Result<(), Failure> {
     let script = arguments.commands.as_deref().map(script).transpose()?;
     let mut wire = Wire::open(settings, arguments.log.as_deref())?;
     homing::ensure(arguments.datum, false, backend, &machine, &mut wire)?;
+    let ticks = start_ticks(&machine);
     let mut jogger = Jogger {
         backend,
         machine: &machine,
         wire,
         encode: arguments.pen.encode_options(),
-        ticks: start_ticks(&machine),
+        ticks,
+        play: Play::new(&machine, ticks.map(|ticks| ticks as f64)),
+        ways: [0; 2],
         aim: None,
         is_down: false,
         step_mm: 1.0,
@@ -103,6 +112,10 @@ struct Jogger<'a> {
     encode: EncodeOptions,
     /// Where its motors are.
     ticks: [i64; 2],
+    /// Where the mechanism is, in the motors' ticks.
+    play: Play,
+    /// The way in which each motor moved last, 1 or -1; 0 if it was not moved from here.
+    ways: [i64; 2],
     /// Where the pen was sent, mm: rounding to ticks must not add up over many steps.
     aim: Option<Point>,
     is_down: bool,
@@ -116,6 +129,7 @@ struct Jogger<'a> {
 impl Jogger<'_> {
     fn follow(&mut self, lines: &[String]) -> Result<(), Failure> {
         let mut refused = None;
+        let mut sketch = Sketch::default();
         for (number, line) in (1..).zip(lines) {
             let command =
                 command::parse(line).map_err(|what| Failure::Usage(anyhow!("line {number}: {what}")))?;
@@ -123,7 +137,11 @@ impl Jogger<'_> {
             if command == JogCommand::Quit {
                 break;
             }
-            let said = match self.obey(command, &mut || false) {
+            let done = match command {
+                JogCommand::Stylus(stylus) => self.follow_stylus(stylus, &mut sketch),
+                command => self.obey(command, &mut || false),
+            };
+            let said = match done {
                 Ok(said) => said,
                 Err(JogError::Refused(what)) => {
                     refused = refused.or(Some(number));
@@ -139,13 +157,45 @@ impl Jogger<'_> {
         }
     }
 
+    /// What a script does instead of the mouse: places on the sheet, one at a time.
+    fn follow_stylus(&mut self, stylus: Stylus, sketch: &mut Sketch) -> Result<String, JogError> {
+        let sheet = self.machine.sheet();
+        sketch.add(stylus.moved(Vec2::new(sheet.x0, sheet.y0)), self.machine);
+        if stylus == Stylus::Release {
+            while let Some(step) = sketch.next() {
+                self.draw(&step, SCRIPT_TOLERANCE_MM, &mut || false)?;
+            }
+        }
+        match sketch.take_complaint() {
+            Some(what) => Err(JogError::Refused(what)),
+            None => Ok(self.place()),
+        }
+    }
+
     /// Where the pen is, mm.
     fn pen(&self) -> Point {
-        self.machine.forward_from_motors(&MotorPos(self.ticks.map(|ticks| ticks as f64)))
+        self.machine.forward_from_motors(&MotorPos(self.play.loads()))
     }
 
     fn pose(&self) -> JointPos {
-        self.machine.joint_positions(&MotorPos(self.ticks.map(|ticks| ticks as f64)))
+        self.machine.joint_positions(&MotorPos(self.play.loads()))
+    }
+
+    /// The motors are there, and nothing is known about their play.
+    fn stand_at(&mut self, ticks: [i64; 2]) {
+        self.ticks = ticks;
+        self.play = Play::new(self.machine, ticks.map(|ticks| ticks as f64));
+        self.ways = [0; 2];
+    }
+
+    /// The motors went there.
+    fn went_to(&mut self, ticks: [i64; 2]) {
+        for motor in 0..2 {
+            let way = (ticks[motor] - self.ticks[motor]).signum();
+            self.ways[motor] = if way == 0 { self.ways[motor] } else { way };
+        }
+        self.ticks = ticks;
+        self.play.follow(ticks.map(|ticks| ticks as f64));
     }
 
     /// Where everything is, in words.
@@ -192,7 +242,7 @@ impl Jogger<'_> {
             JogCommand::Home => self.home()?,
             JogCommand::Where => self.locate()?,
             JogCommand::Touch(place) => return self.touch(place),
-            JogCommand::Quit => {}
+            JogCommand::Stylus(_) | JogCommand::Quit => {}
         }
         Ok(self.place())
     }
@@ -217,19 +267,34 @@ impl Jogger<'_> {
             let line = Segment::Line(Line::new(here, to));
             self.machine.check_segment(&line).map_err(|error| JogError::Refused(error.to_string()))?;
         }
-        let ticks = self.machine.motor_positions(&pose).0.map(|ticks| ticks.round() as i64);
-        self.drive(ticks, stops)?;
+        let ticks = self.machine.motor_positions(&pose).0;
+        self.drive(self.beyond_play(ticks), stops)?;
         self.aim = Some(to);
         Ok(())
+    }
+
+    /// Where the motors must be for the mechanism to be there: half of their backlash ahead in the direction in
+    /// which it moves.
+    fn beyond_play(&self, to: [f64; 2]) -> [i64; 2] {
+        let loads = self.play.loads();
+        [0, 1].map(|motor| {
+            let (way, play) = (to[motor] - loads[motor], self.machine.motors()[motor].backlash_ticks);
+            if play > 0.0 && way.abs() <= 0.5 {
+                return self.ticks[motor];
+            }
+            (to[motor] + (0.5 * play).copysign(way)).round() as i64
+        })
     }
 
     /// The first fault on the way of the motors to these positions.
     fn check_way(&self, to: [i64; 2]) -> Result<(), String> {
         let ends = [self.ticks, to].map(|ticks| MotorPos(ticks.map(|ticks| ticks as f64)));
         let is_in_reach = self.machine.check_point(self.pen()).is_ok();
+        let mut play = self.play;
         for k in 1..=SAMPLES {
             let motors = ends[0] + f64::from(k) / f64::from(SAMPLES) * (ends[1] - ends[0]);
-            let pose = self.machine.joint_positions(&motors);
+            play.follow(motors.0);
+            let pose = self.machine.joint_positions(&MotorPos(play.loads()));
             if let Some(fault) = self.machine.joint_fault_between(&pose) {
                 return Err(fault.to_string());
             }
@@ -266,18 +331,27 @@ impl Jogger<'_> {
         };
         self.is_down = false;
         self.execute(program, stops)?;
-        self.ticks = to;
+        self.went_to(to);
         Ok(())
     }
 
     fn program(&self, rows: &[Row]) -> Result<Program, Failure> {
+        self.encoded(rows, |source| self.backend.program(source, &self.encode))
+    }
+
+    /// The program of these rows; times count from the first one.
+    fn encoded(
+        &self,
+        rows: &[Row],
+        encode: impl FnOnce(&PlanSource<'_>) -> Result<Program, ProgramError>,
+    ) -> Result<Program, Failure> {
         let rows: Vec<Row> = rows.iter().map(|row| Row { t_us: row.t_us - rows[0].t_us, ..*row }).collect();
         let header = header(self.machine, &rows);
         let each = || -> RowIter<'_> {
             Box::new(rows.iter().map(|row| (*row, row.ticks.map(|ticks| ticks as f64))))
         };
         let source = PlanSource::new(&header, &each).on_machine(self.machine);
-        self.backend.program(&source, &self.encode).map_err(|error| Failure::Drawing(error.into()))
+        encode(&source).map_err(|error| Failure::Drawing(error.into()))
     }
 
     /// The position that the controller reports at these ticks, where its reports count ticks.
@@ -312,13 +386,7 @@ impl Jogger<'_> {
         let pen = u16::from(down);
         let wait_us = ((wait_s * 1e6) as u64).max(1000);
         let rows = [Row { t_us: 0, pen, ticks: self.ticks }, Row { t_us: wait_us, pen, ticks: self.ticks }];
-        let header = header(self.machine, &rows);
-        let each = || -> RowIter<'_> {
-            Box::new(rows.iter().map(|row| (*row, row.ticks.map(|ticks| ticks as f64))))
-        };
-        let source = PlanSource::new(&header, &each).on_machine(self.machine);
-        let program = self.backend.pen_program(&source, &self.encode, down);
-        let program = program.map_err(|error| Failure::Drawing(error.into()))?;
+        let program = self.encoded(&rows, |source| self.backend.pen_program(source, &self.encode, down))?;
         self.execute(program, stops)?;
         self.is_down = down;
         Ok(())
@@ -327,7 +395,11 @@ impl Jogger<'_> {
     fn home(&mut self) -> Result<(), JogError> {
         let homing = self.machine.parts().homing.as_ref();
         let Some((homing, steps)) = homing.zip(self.backend.homing(self.machine)) else {
-            return Err(JogError::Refused("this machine has no switches to home by".to_owned()));
+            let why = match homing {
+                Some(homing) if homing.needs_stop() => "this protocol cannot home to a mechanical stop",
+                _ => "this machine has no switches to home by",
+            };
+            return Err(JogError::Refused(why.to_owned()));
         };
         self.wire.home(HomingRun::new(steps, homing))?;
         self.aim = None;
@@ -360,8 +432,8 @@ impl Jogger<'_> {
         };
         if ticks != self.ticks {
             self.aim = None;
+            self.stand_at(ticks);
         }
-        self.ticks = ticks;
         Ok(())
     }
 
@@ -390,12 +462,13 @@ impl Jogger<'_> {
         let is_new = !fs::exists(&file).unwrap_or(false);
         let opened = fs::OpenOptions::new().create(true).append(true).open(&file);
         let [a, b] = self.ticks;
+        let [from_a, from_b] = self.ways.map(|way| ["-", "", "+"][(way + 1) as usize]);
         let written = opened.and_then(|mut out| {
             if is_new {
                 let [first, second] = self.machine.motors();
-                writeln!(out, "x_mm,y_mm,{},{}", first.name, second.name)?;
+                writeln!(out, "x_mm,y_mm,{},{},approach1,approach2", first.name, second.name)?;
             }
-            writeln!(out, "{x},{y},{a},{b}")
+            writeln!(out, "{x},{y},{a},{b},{from_a},{from_b}")
         });
         written.map_err(|error| Failure::writing(error, &file))?;
         self.touches += 1;

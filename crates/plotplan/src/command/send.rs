@@ -179,6 +179,11 @@ fn program(
     encode.legacy_moves = arguments.stepper_moves;
     let unfit = |error: ProgramError| Failure::Drawing(error.into());
     let program = backend.program(&source, &encode).map_err(unfit)?;
+    let program = match &machine {
+        Some(machine) => program.on_machine(machine),
+        None => program,
+    };
+    warn_of_play(arguments, &program, machine.as_ref());
     Ok((program, machine))
 }
 
@@ -203,6 +208,18 @@ fn warn_of_losses(backend: &dyn Backend, table: &TickTable) {
     pens.dedup();
     for loss in backend.losses(&table.header, &pens) {
         terminal::warning(Code::FormatLoss, &loss.to_string());
+    }
+}
+
+/// Warns that a plan in the machine's own language is resumed without taking up the backlash.
+fn warn_of_play(arguments: &Send, program: &Program, machine: Option<&Machine>) {
+    let has_play = machine.is_some_and(Machine::has_backlash);
+    if arguments.from.is_some() && has_play && program.table().is_none() {
+        terminal::warning(
+            Code::FormatLoss,
+            "the backlash is not taken up where this plan is resumed: ink may be off by it until each motor has \
+             reversed",
+        );
     }
 }
 

@@ -1,6 +1,9 @@
 //! The language of jog scripts: one command a line.
 
 use compiler::quantity;
+use drawing::Point;
+
+use super::sketch::Stylus;
 
 /// What a key or a line asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +28,8 @@ pub(super) enum JogCommand {
     Where,
     /// Records a touch.
     Touch(Option<(f64, f64)>),
+    /// What the mouse does in the drawing mode; in a script at a place of the sheet, mm.
+    Stylus(Stylus),
     /// Ends.
     Quit,
 }
@@ -71,11 +76,14 @@ pub(super) fn parse(line: &str) -> Result<Option<JogCommand>, String> {
         ["where"] => JogCommand::Where,
         ["touch"] => JogCommand::Touch(None),
         ["touch", x, y] => JogCommand::Touch(Some((mm(x)?, mm(y)?))),
+        ["press", x, y] => JogCommand::Stylus(Stylus::Press(Point::new(mm(x)?, mm(y)?))),
+        ["drag", x, y] => JogCommand::Stylus(Stylus::Drag(Point::new(mm(x)?, mm(y)?))),
+        ["release"] => JogCommand::Stylus(Stylus::Release),
         ["quit"] => JogCommand::Quit,
         _ => {
             return Err(format!(
                 "`{}` is none of left, right, up, down [MM], move X Y, goto X Y, step MM, motor 1|2 TICKS, pen up|down, \
-                 corner ll|lr|ur|ul, home, where, touch [X Y], quit",
+                 corner ll|lr|ur|ul, home, where, touch [X Y], press X Y, drag X Y, release, quit",
                 line.trim()
             ));
         }
@@ -96,11 +104,14 @@ mod tests {
             ("motor 2 -15", JogCommand::Motor(1, -15)),
             ("corner ur", JogCommand::Corner(2)),
             ("touch 1cm 20", JogCommand::Touch(Some((10.0, 20.0)))),
+            ("drag 1cm 20", JogCommand::Stylus(Stylus::Drag(Point::new(10.0, 20.0)))),
         ] {
             assert_eq!(parse(line), Ok(Some(command)), "{line}");
         }
         assert_eq!(parse(" # nothing"), Ok(None));
-        for wrong in ["jump", "left 5s", "motor 3 1", "motor 1 0.5", "step 0", "corner mm", "pen", "goto 1"] {
+        for wrong in
+            ["jump", "left 5s", "motor 3 1", "motor 1 0.5", "step 0", "corner mm", "pen", "goto 1", "press 1"]
+        {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
