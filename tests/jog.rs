@@ -1,6 +1,7 @@
 //! `plotplan jog --commands` on the emulated controllers.
 #![cfg(unix)]
 
+use std::fmt::Write as _;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::{Child, Command, Output, Stdio};
@@ -115,9 +116,9 @@ fn jog_never_leaves_the_reach() {
         for direction in ["left", "right", "up", "down"] {
             script += "goto 60 60\n";
             for _ in 0..12 {
-                script += &format!("{direction} 50\n");
+                let _ = writeln!(script, "{direction} 50");
             }
-            script += &format!("{direction} 5000\n");
+            let _ = writeln!(script, "{direction} 5000");
         }
         script += "motor 1 1000000\nmotor 2 -1000000\nwhere\n";
         let output = jog(&dir, protocol, name, &script, "");
@@ -176,12 +177,11 @@ fn ink_mm(table: &str, protocol: &str, machine: &Machine) -> Vec<Vec<Point>> {
     let mut lines: Vec<Vec<Point>> = Vec::new();
     for row in table.lines().skip(1) {
         let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().expect("a number")).collect();
-        let at = match protocol {
-            "gcode" => Point::new(cells[2], cells[3]),
-            _ => {
-                let origin = if protocol == "ebb" { start } else { MotorPos::ZERO };
-                machine.forward_from_motors(&MotorPos([cells[2] + origin[0], cells[3] + origin[1]]))
-            }
+        let at = if protocol == "gcode" {
+            Point::new(cells[2], cells[3])
+        } else {
+            let origin = if protocol == "ebb" { start } else { MotorPos::ZERO };
+            machine.forward_from_motors(&MotorPos([cells[2] + origin[0], cells[3] + origin[1]]))
         };
         if lines.len() <= cells[0] as usize {
             lines.push(Vec::new());

@@ -190,9 +190,10 @@ impl Jogger<'_> {
 
     /// The motors went there.
     fn went_to(&mut self, ticks: [i64; 2]) {
-        for motor in 0..2 {
-            let way = (ticks[motor] - self.ticks[motor]).signum();
-            self.ways[motor] = if way == 0 { self.ways[motor] } else { way };
+        let from = self.ticks;
+        for (motor, way) in self.ways.iter_mut().enumerate() {
+            let now = (ticks[motor] - from[motor]).signum();
+            *way = if now == 0 { *way } else { now };
         }
         self.ticks = ticks;
         self.play.follow(ticks.map(|ticks| ticks as f64));

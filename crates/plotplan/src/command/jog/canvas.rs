@@ -53,6 +53,20 @@ impl View {
         Self { center: fixed + (column_mm / self.column_mm) * (self.center - fixed), column_mm }
     }
 
+    /// Where `Canvas` must be asked to print a text so that it begins in the cell of this place: it counts one
+    /// column and one row less than it has.
+    fn print_at(&self, place: Point, area: Rect) -> [f64; 2] {
+        let inner = inside(area);
+        let [[left, right], [bottom, top]] = self.bounds(area);
+        let cell = |from_edge_mm: f64, cell_mm: f64, cells: u16, length_mm: f64| {
+            let cell = (from_edge_mm / cell_mm).floor();
+            (cell + 0.5) * length_mm / f64::from(cells.max(2) - 1)
+        };
+        let x = left + cell(place.x - left, self.column_mm, inner.width, right - left);
+        let y = top - cell(top - place.y, 2.0 * self.column_mm, inner.height, top - bottom);
+        [x, y]
+    }
+
     /// Left and right, bottom and top edge.
     fn bounds(&self, area: Rect) -> [[f64; 2]; 2] {
         let inner = inside(area);
@@ -98,7 +112,8 @@ pub(super) fn show(frame: &mut Frame<'_>, area: Rect, view: View, title: &str, s
             }
             context.layer();
             for (at, name) in shown.corners.iter().zip(CORNERS) {
-                context.print(at.x, at.y, Line::styled(name, Style::new().fg(Color::Blue)));
+                let [x, y] = view.print_at(*at, area);
+                context.print(x, y, Line::styled(name, Style::new().fg(Color::Blue)));
             }
             context.layer();
             for stroke in shown.strokes {
@@ -110,11 +125,8 @@ pub(super) fn show(frame: &mut Frame<'_>, area: Rect, view: View, title: &str, s
             // Over the names of the corners.
             context.layer();
             context.draw(&Points { coords: &[(shown.pen.x, shown.pen.y)], color: Color::Red });
-            context.print(
-                shown.pen.x,
-                shown.pen.y,
-                Line::styled("+", Style::new().fg(Color::Red).add_modifier(Modifier::BOLD)),
-            );
+            let [x, y] = view.print_at(shown.pen, area);
+            context.print(x, y, Line::styled("+", Style::new().fg(Color::Red).add_modifier(Modifier::BOLD)));
         });
     frame.render_widget(canvas, area);
 }

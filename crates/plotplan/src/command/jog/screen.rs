@@ -39,8 +39,7 @@ const KEYS: [&str; 4] = [
     "h home by switches   w ask where it is   m draw with the mouse   q quit",
 ];
 /// Keys of the drawing mode.
-const MOUSE_KEYS: &str =
-    "left button draws   wheel + - zoom   s sheet   0 reach   Esc stops   m keys   q quit";
+const MOUSE_KEYS: &str = "button draws  wheel + - zoom  s sheet  0 reach  Esc stops  m keys  q quit";
 /// With this variable in the environment `!` makes the program panic: a test looks at the terminal afterwards.
 const PANIC_VARIABLE: &str = "PLOTPLAN_TEST_PANIC";
 /// A notch of the wheel zooms by this.
