@@ -196,6 +196,25 @@ fn firmware_header_moves_coupled_motors_together() {
 }
 
 #[test]
+fn homing_to_a_stop_is_reported_where_the_firmware_cannot() {
+    let stop = SWITCHES.replace("\"left\"", "\"stop\"");
+    let dir = desk("cartesian", &stop);
+    let checked = PROGRAM.run(&dir, "machine check mine.toml");
+    assert!(said(&checked).contains("mechanical stop"), "{}", said(&checked));
+    let device = Emulated::start(&dir, "ticks", "");
+    let refused = send(&dir, "ticks", "--home");
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("cannot home to a mechanical stop"), "{}", said(&refused));
+    assert_eq!(device.ink(&dir), 0);
+    PROGRAM.fail(&dir, "machine show mine.toml --firmware-config", 2);
+    // A firmware for G-code may be set up for it.
+    let device = Emulated::start(&dir, "gcode", "");
+    let homed = send(&dir, "gcode", "--home");
+    assert!(homed.status.success(), "{}", said(&homed));
+    assert!(device.ink(&dir) > 0);
+}
+
+#[test]
 fn impossible_homing_is_an_error_that_names_the_key() {
     let dir = TestDir::new();
     let toml = PRESETS.iter().find(|other| other.name == "corexy").expect("a preset").toml;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 use compiler::machine_file::PRESETS;
-use test_support::{Program, TestDir, stdout};
+use test_support::{Program, TestDir, stderr, stdout};
 
 const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_plotplan"));
 
@@ -88,7 +88,7 @@ fn impossible_pens_and_backlash_are_errors_that_name_the_key() {
         machine(&dir, "wrong.toml", "coaxial", from, to);
         let output = PROGRAM.run(&dir, "machine check wrong.toml");
         assert!(!output.status.success(), "{to}: {}", stdout(&output));
-        let _ = writeln!(said, "{to}\n--\n{}", test_support::stderr(&output));
+        let _ = writeln!(said, "{to}\n--\n{}", stderr(&output));
     }
     insta::assert_snapshot!(said);
 }
@@ -150,6 +150,41 @@ fn backlash_of_the_machine_file_is_planned_and_verified() {
     PROGRAM.fail(&dir, "verify b.csv --drawing a.plt --machine loose.toml", 1);
     // Without a drawing the plan is compared with its own ink.
     PROGRAM.succeed(&dir, "verify a.json");
+    // Where the firmware plans the motion there is no compensation.
+    for (format, warns) in [("gcode-grbl", true), ("gcode-marlin", true), ("gcode-timed", false)] {
+        let converted = PROGRAM.run(&dir, &format!("convert a.plt -m loose.toml --format {format} -o -"));
+        assert!(converted.status.success(), "{format}: {}", stderr(&converted));
+        assert_eq!(stderr(&converted).contains("backlash"), warns, "{format}: {}", stderr(&converted));
+    }
+    let without = PROGRAM.run(&dir, "convert a.plt -m cartesian --format gcode-grbl -o -");
+    assert!(!stderr(&without).contains("backlash"), "{}", stderr(&without));
+}
+
+/// A circle of 12.5 mm.
+#[test]
+fn heat_maps_show_the_ink_of_a_machine_with_backlash() {
+    let dir = TestDir::new();
+    // In the middle of the table, as large as it is drawn.
+    fs::write(dir.path().join("a.plt"), "IN;SP1;PU6000,6000;CI500;PU;").unwrap();
+    let toml = PRESETS.iter().find(|other| other.name == "cartesian").expect("a preset").toml;
+    // 4 mm: the motors are 2 mm ahead.
+    let with = toml.replace("max_acceleration =", "backlash = 320\nmax_acceleration =");
+    fs::write(dir.path().join("loose.toml"), with).unwrap();
+    PROGRAM.succeed(&dir, "convert a.plt -m loose.toml -o a.json");
+    let svg = PROGRAM.stdout_of(&dir, "preview a.json --color-by order --format svg -o -");
+    let mut points = 0;
+    for line in svg.lines().filter(|line| line.contains("class=\"colored\"")) {
+        let list = line.split(" d=\"M").nth(1).and_then(|rest| rest.split('"').next()).expect("a path");
+        let numbers: Vec<f64> =
+            list.split([' ', 'L']).map(|number| number.parse().expect("a number")).collect();
+        for pair in numbers.chunks_exact(2) {
+            points += 1;
+            // y points down in a picture.
+            let radius = libm::hypot(pair[0] - 150.0, pair[1] + 150.0);
+            assert!((radius - 12.5).abs() < 0.15, "{pair:?} is {radius} mm from the middle");
+        }
+    }
+    assert!(points > 50, "{points} points: {}", &svg[..svg.len().min(3000)]);
 }
 
 #[test]

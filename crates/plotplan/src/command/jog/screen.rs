@@ -87,8 +87,11 @@ impl Raw {
 
 impl Drop for Raw {
     fn drop(&mut self) {
-        let _ = execute!(stdout(), DisableMouseCapture);
-        ratatui::restore();
+        // The hooks did it before the panic was printed; again, it would move the cursor over the message.
+        if !std::thread::panicking() {
+            let _ = execute!(stdout(), DisableMouseCapture);
+            ratatui::restore();
+        }
     }
 }
 
