@@ -111,6 +111,67 @@ fn every_option_has_the_bytes_of_the_program() {
 }
 
 #[test]
+fn paper_pens_copies_laws_and_best_place_have_the_bytes_of_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |text: &str| text.to_owned();
+    let drawing = b"IN;SP1;PU400,400;PD1200,400,1200,800;SP2;PU400,800;PD600,900;PU;";
+    std::fs::write(folder.path().join("a.hpgl"), drawing).unwrap();
+    let mut studio = Studio::default();
+    studio.open("a.hpgl", drawing);
+    let all = [
+        Options { paper: text("A5,landscape"), fit: true, margin: text("4mm"), ..Options::default() },
+        Options { only_pens: text("2"), align: text("center"), ..Options::default() },
+        Options { copies: text("3x2"), gap: text("2.5mm"), fit: true, ..Options::default() },
+        Options {
+            law: text("sine"),
+            segment_time: text("800ms"),
+            align: text("center"),
+            ..Options::default()
+        },
+        Options { place: text("best"), ..Options::default() },
+        Options { place: text("best"), best_for: text("accuracy"), paper: text("A4"), ..Options::default() },
+    ];
+    for options in all {
+        let job = job("coaxial", options);
+        for kind in [
+            Kind::Format("ticks"),
+            Kind::Format("json"),
+            Kind::Format("svg"),
+            Kind::Picture("svg"),
+            Kind::Picture("png"),
+            Kind::Page,
+        ] {
+            assert_same_bytes(folder.path(), &mut studio, &job, kind);
+        }
+    }
+}
+
+#[test]
+fn several_files_have_the_bytes_of_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut studio = opened(folder.path(), "rings.svg");
+    let text = |text: &str| text.to_owned();
+    let drawing = b"IN;SP3;PU400,400;PD1200,400,1200,800;PU;";
+    std::fs::write(folder.path().join("b.hpgl"), drawing).unwrap();
+    studio.add("b.hpgl", drawing);
+    for options in [
+        Options { fit: true, ..Options::default() },
+        Options { fit: true, only_pens: text("1,3"), pens: text("colors"), ..Options::default() },
+    ] {
+        let job = job("corexy", options);
+        for kind in [
+            Kind::Format("ticks"),
+            Kind::Format("json"),
+            Kind::Format("svg"),
+            Kind::Picture("svg"),
+            Kind::Page,
+        ] {
+            assert_same_bytes(folder.path(), &mut studio, &job, kind);
+        }
+    }
+}
+
+#[test]
 fn own_machine_file_has_the_bytes_of_the_program() {
     let folder = tempfile::tempdir().unwrap();
     let mut studio = opened(folder.path(), "zot.hpgl");

@@ -1,18 +1,23 @@
 //! What the page asks for: a machine and the options of the command line, as text.
 
+use compiler::best_place::{BestFor, Search};
 use compiler::import::{self, PenRule, SvgOptions};
+use compiler::layout::{Copies, Layout};
 use compiler::machine_file::{MachineFile, MachineFileError, PRESETS};
 use compiler::option;
 use compiler::pipeline::{Order, Request};
+use compiler::report::BestPlaceReport;
 use drawing::{Pen, Vec2};
 use kinematics::Machine;
-use planner::{Mirror, PlacementOptions, Rounding, Scale, TimingLaw};
+use planner::{Easing, Mirror, PlacementOptions, Rounding, Scale, TimingLaw};
 use serde::Deserialize;
 
 use crate::problem::{About, Problem, Problems};
 
 /// The tolerance without `--tolerance`, mm.
 const TOLERANCE_MM: f64 = 0.1;
+/// The time of a segment without `--segment-time`, s.
+const SEGMENT_TIME_S: f64 = 0.5;
 /// The effort without `--effort`.
 const EFFORT: u8 = 2;
 /// A draft is planned with this many times the tolerance.
@@ -56,8 +61,10 @@ pub struct Options {
     pub effort: String,
     /// `--speed`: `machine` or `file`
     pub speed: String,
-    /// `--law`: `time-optimal` or `trapezoid`
+    /// `--law`: `time-optimal`, `trapezoid`, `linear`, `sine` or `quadratic`
     pub law: String,
+    /// `--segment-time`, with one of the last three
+    pub segment_time: String,
     /// `--rounding`: `path` or `nearest`
     pub rounding: String,
     /// `--fit`
@@ -66,8 +73,11 @@ pub struct Options {
     pub shrink: bool,
     /// `--align`
     pub align: String,
-    /// `--place`
+    /// `--place`: two lengths, or `best`
     pub place: String,
+    /// `--for`: `time` or `accuracy`, with `--place best`
+    #[serde(rename = "for")]
+    pub best_for: String,
     /// `--scale`
     pub scale: String,
     /// `--rotate`
@@ -78,6 +88,14 @@ pub struct Options {
     pub margin: String,
     /// `--page`
     pub page: String,
+    /// `--paper`
+    pub paper: String,
+    /// `--only-pens`
+    pub only_pens: String,
+    /// `--copies`
+    pub copies: String,
+    /// `--gap`, with `--copies`
+    pub gap: String,
     /// SVG: `--pens`: `layers`, `colors` or `one`
     pub pens: String,
     /// SVG: `--hatch`
@@ -124,23 +142,46 @@ impl Options {
             text(Use::Order, "effort", &self.effort),
             text(Use::Motion, "speed", &self.speed),
             text(Use::Motion, "law", &self.law),
+            text(Use::Motion, "segment-time", self.segment_time_given()),
             text(Use::Motion, "rounding", &self.rounding),
             flag(Use::Place, "fit", self.fit),
             flag(Use::Place, "shrink", self.shrink),
             text(Use::Place, "align", &self.align),
             text(Use::Place, "place", &self.place),
+            text(Use::Place, "for", if self.is_best_place() { &self.best_for } else { "" }),
             text(Use::Place, "scale", &self.scale),
             text(Use::Place, "rotate", &self.rotate),
             text(Use::Place, "mirror", &self.mirror),
             text(Use::Place, "margin", &self.margin),
             text(Use::Reading, "page", &self.page),
+            text(Use::Reading, "paper", &self.paper),
             text(Use::Reading, "pens", &self.pens),
             text(Use::Reading, "hatch", &self.hatch),
             flag(Use::Reading, "outline-fills", self.outline_fills),
+            text(Use::Reading, "only-pens", &self.only_pens),
+            text(Use::Reading, "copies", &self.copies),
+            text(Use::Reading, "gap", if self.copies.trim().is_empty() { "" } else { &self.gap }),
         ]
         .into_iter()
         .flatten()
         .collect()
+    }
+
+    /// Whether the best place is searched for.
+    pub(crate) fn is_best_place(&self) -> bool {
+        self.place.trim() == "best"
+    }
+
+    /// The time of a segment, if the law has one.
+    fn segment_time_given(&self) -> &str {
+        if ["linear", "sine", "quadratic"].contains(&self.law.trim()) { &self.segment_time } else { "" }
+    }
+
+    /// With the place that was found instead of a search.
+    pub(crate) fn found(&self, best: &BestPlaceReport) -> Self {
+        let [x, y] = best.place_mm;
+        let rotate = if best.rotate_deg == 0.0 { String::new() } else { best.rotate_deg.to_string() };
+        Self { place: format!("{x}mm,{y}mm"), rotate, margin: String::new(), ..self.clone() }
     }
 
     /// The options that a command of this kind takes.
@@ -174,6 +215,41 @@ impl Options {
         Ok(import::Options { svg, ..import::Options::default() })
     }
 
+    /// What is drawn of the drawing.
+    ///
+    /// # Errors
+    /// Options that cannot be read.
+    pub(crate) fn layout(&self) -> Result<Layout, Problems> {
+        let gap_mm = parsed("gap", &self.gap, option::length)?.unwrap_or_default();
+        let copies = parsed("copies", &self.copies, option::grid)?;
+        Ok(Layout {
+            only_pens: parsed("only-pens", &self.only_pens, option::pens)?,
+            copies: copies.map(|(columns, rows)| Copies { columns, rows, gap_mm }),
+            ..Layout::default()
+        })
+    }
+
+    /// The machine with the sheet that is asked for.
+    pub(crate) fn on_paper(&self, machine: Machine) -> Result<Machine, Problems> {
+        match parsed("paper", &self.paper, compiler::paper::size_mm)? {
+            None => Ok(machine),
+            Some([width_mm, height_mm]) => {
+                let wrong = |error: kinematics::MachineError| Problem {
+                    option: Some("paper"),
+                    ..Problem::new(About::Option, format!("--paper {}: {error}", self.paper))
+                };
+                machine.with_sheet_size(width_mm, height_mm).map_err(|error| wrong(error).into())
+            }
+        }
+    }
+
+    /// The search for the best place, if one is asked for.
+    fn search(&self) -> Result<Option<Search>, Problems> {
+        let aim = choice("for", &self.best_for, &[("time", BestFor::Time), ("accuracy", BestFor::Accuracy)])?;
+        let turns = self.rotate.trim().is_empty();
+        Ok(self.is_best_place().then_some(Search { aim: aim.unwrap_or(BestFor::Time), turns }))
+    }
+
     /// The page, from 1.
     pub(crate) fn page(&self) -> Result<usize, Problems> {
         let number =
@@ -205,7 +281,8 @@ impl Options {
         } else if let Some((x, y)) = parsed("align", &self.align, option::align)? {
             Scale::Aligned { factor, align: Vec2::new(x, y) }
         } else {
-            let (x, y) = parsed("place", &self.place, option::place)?.unwrap_or_default();
+            let place = if self.is_best_place() { "" } else { &self.place };
+            let (x, y) = parsed("place", place, option::place)?.unwrap_or_default();
             Scale::Explicit { factor, origin_mm: Vec2::new(x, y) }
         };
         Ok(PlacementOptions {
@@ -244,6 +321,15 @@ fn choice<T: Copy>(name: &'static str, text: &str, known: &[(&str, T)]) -> Resul
 }
 
 impl Job {
+    /// The machine with its sheet, and its file.
+    ///
+    /// # Errors
+    /// What is wrong with the machine file or the paper.
+    pub(crate) fn read_machine(&self) -> Result<(MachineFile, Machine), Problems> {
+        let (file, machine) = self.machine.read()?;
+        Ok((file, self.options.on_paper(machine)?))
+    }
+
     /// The request for a page of a drawing.
     ///
     /// # Errors
@@ -258,10 +344,19 @@ impl Job {
             _ => Vec::new(),
         };
         let period_s = parsed("period", &options.period, option::time)?.unwrap_or(machine.parts().period_s);
+        let segment_time_s = parsed("segment-time", options.segment_time_given(), option::time)?;
+        let segment_time_s = segment_time_s.unwrap_or(SEGMENT_TIME_S);
+        let fixed = |easing| TimingLaw::FixedDuration { easing, segment_time_s };
         let law = choice(
             "law",
             &options.law,
-            &[("time-optimal", TimingLaw::TimeOptimal), ("trapezoid", TimingLaw::Trapezoid)],
+            &[
+                ("time-optimal", TimingLaw::TimeOptimal),
+                ("trapezoid", TimingLaw::Trapezoid),
+                ("linear", fixed(Easing::Linear)),
+                ("sine", fixed(Easing::SineOut)),
+                ("quadratic", fixed(Easing::QuadraticInOut)),
+            ],
         )?;
         let rounding = choice(
             "rounding",
@@ -272,7 +367,7 @@ impl Job {
             tolerance_mm: parsed("tolerance", &options.tolerance, option::length)?.unwrap_or(TOLERANCE_MM),
             period_us: (period_s * 1e6).round().max(0.0) as u64,
             order: options.order(true)?,
-            search: None,
+            search: options.search()?,
             crop: None,
             placement: options.placement()?,
             pen_speeds,
@@ -292,6 +387,8 @@ fn drafted(request: Request) -> Request {
     Request {
         tolerance_mm: DRAFT_TOLERANCE * request.tolerance_mm,
         order: Order::File,
+        // A search takes hundreds of plans.
+        search: None,
         timing_law: TimingLaw::TimeOptimal,
         rounding: Rounding::Nearest,
         joint_fit: false,

@@ -17,14 +17,18 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod emulated;
 mod job;
 mod output;
 mod problem;
 mod protocol;
+mod sending;
 mod session;
 
 pub use compiler::pipeline::Step;
+pub use emulated::{EmulateJob, Emulated};
 pub use job::{Job, MachineChoice, Options};
 pub use output::{Kind, Output, formats};
 pub use problem::{About, Problem, Problems};
+pub use sending::{Datum, Event, Phase, ProtocolInfo, SendJob, Sending, Step as SendStep, protocols};
 pub use session::{Reply, Studio};

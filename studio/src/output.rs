@@ -1,7 +1,6 @@
 //! Outputs: the files that `plotplan convert` and `plotplan preview` write, and their command lines.
 
 use backends::{Backend, EncodeOptions, PlanSource, RowIter, WriteError};
-use compiler::layout::Layout;
 use compiler::pipeline::{self, Step, Target};
 use compiler::scene;
 use compiler::settings::Settings;
@@ -93,17 +92,19 @@ impl Kind<'_> {
 impl Studio {
     /// The name of an output, and the command with which the program writes the same.
     pub fn command(&self, job: &Job, kind: Kind<'_>) -> (String, Vec<String>) {
-        let stem = self.name().rsplit_once('.').map_or(self.name(), |(stem, _)| stem);
+        let first = self.names().next().unwrap_or_default();
+        let stem = first.rsplit_once('.').map_or(first, |(stem, _)| stem);
         let extension = kind.extension();
         let mut name = format!("{stem}.{extension}");
-        if name == self.name() {
+        if self.names().any(|input| input == name) {
             // An output does not replace an input.
             name = format!("{stem}-out.{extension}");
         }
         let command = if matches!(kind, Kind::Format(_)) { "convert" } else { "preview" };
-        let mut words = vec!["plotplan".to_owned(), command.to_owned(), self.name().to_owned()];
+        let mut words = vec!["plotplan".to_owned(), command.to_owned()];
+        words.extend(self.names().map(str::to_owned));
         words.push(format!("--machine={}", job.machine.word()));
-        words.extend(self.settled(job).options.words(kind.purpose()));
+        words.extend(self.resolved(job, kind).options.words(kind.purpose()));
         if let Kind::Format(format) = kind
             && format != extension
         {
@@ -113,12 +114,28 @@ impl Studio {
         (name, words)
     }
 
+    /// The job for an output: where no plan is made, the best place is that of the last plan.
+    fn resolved(&self, job: &Job, kind: Kind<'_>) -> Job {
+        let job = Job { draft: false, ..self.settled(job) };
+        if !job.options.is_best_place() || kind.purpose() == For::Plan {
+            return job;
+        }
+        let best = self.planned_before(&job).and_then(|planned| planned.summary.best_place.as_ref());
+        let options = best.map(|best| job.options.found(best));
+        Job { options: options.unwrap_or_else(|| job.options.clone()), ..job }
+    }
+
     /// Writes an output.
     ///
     /// # Errors
     /// Why the drawing cannot be planned or placed; what the format cannot represent.
     pub fn output(&mut self, job: &Job, kind: Kind<'_>, progress: &dyn Fn(Step)) -> Result<Output, Problems> {
+        let asked = job;
         let job = &Job { draft: false, ..self.settled(job) };
+        if job.options.is_best_place() && kind.purpose() != For::Plan {
+            self.planned(job, progress)?;
+        }
+        let job = &self.resolved(job, kind);
         let mut losses = Vec::new();
         let mut bytes = Vec::new();
         match kind {
@@ -146,13 +163,13 @@ impl Studio {
                 }
             }
         }
-        let (name, words) = self.command(job, kind);
+        let (name, words) = self.command(asked, kind);
         Ok(Output { name, bytes, words, losses })
     }
 
     /// The placed drawing in a format of drawings.
     fn arranged(&mut self, job: &Job, kind: Kind<'_>) -> Result<Vec<u8>, Problems> {
-        let (_, machine) = job.machine.read()?;
+        let (_, machine) = job.read_machine()?;
         let (page, _) = self.page(job)?;
         self.refuse_unusable(&page)?;
         let target = Target::Machine(&machine);
@@ -172,7 +189,7 @@ impl Studio {
 
     /// A picture of the placed drawing.
     fn picture(&mut self, job: &Job, form: &str) -> Result<Vec<u8>, Problems> {
-        let (_, machine) = job.machine.read()?;
+        let (_, machine) = job.read_machine()?;
         let (page, _) = self.page(job)?;
         self.refuse_unusable(&page)?;
         let request = job.request(&page, &machine)?;
@@ -193,11 +210,10 @@ impl Studio {
     /// The plan document.
     fn document(&self, job: &Job, planned: &Planned, out: &mut Vec<u8>) -> Result<(), Problems> {
         let command_line = job.options.words(For::Plan);
-        let reading = job.options.reading()?;
-        let settings =
-            Settings::of(&planned.request, planned.page_number, &reading, &Layout::default(), command_line);
+        let (reading, layout) = (job.options.reading()?, job.options.layout()?);
+        let settings = Settings::of(&planned.request, planned.page_number, &reading, &layout, command_line);
         let document = plan::file::json::Document {
-            source: plan::file::json::Source { name: self.name().to_owned(), sha256: self.sha256() },
+            source: plan::file::json::Source { name: self.name(), sha256: self.sha256() },
             machine: serde_json::to_value(&planned.file).map_err(unwritten)?,
             settings: serde_json::to_value(&settings).map_err(unwritten)?,
             summary: serde_json::to_value(&planned.summary).map_err(unwritten)?,

@@ -5,9 +5,11 @@ use compiler::pipeline::Step;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use crate::emulated::{EmulateJob, Emulated};
 use crate::job::Job;
 use crate::output::{Kind, formats};
 use crate::problem::{About, Problem, Problems};
+use crate::sending::{Event, SendJob, Sending, protocols};
 use crate::session::{Reply, Studio};
 
 /// A request.
@@ -20,6 +22,9 @@ enum Request {
     Open {
         /// Its name.
         name: String,
+        /// Whether it is laid over those that are open.
+        #[serde(default)]
+        adds: bool,
     },
     /// The drawing as the job reads it.
     Drawing {
@@ -52,6 +57,36 @@ enum Request {
         /// Kinds and names, as in `Output`.
         outputs: Vec<(String, String)>,
     },
+    /// Begins to send the file whose bytes follow.
+    Send {
+        /// How.
+        job: SendJob,
+    },
+    /// The page's end of the wire: what was received follows; the answer has what is to be written.
+    Wire {
+        /// The page's clock, microseconds.
+        now_us: f64,
+        /// What happened.
+        #[serde(default)]
+        event: Event,
+        /// Whether everything written before has left.
+        is_clear: bool,
+    },
+    /// Switches an emulated machine on.
+    Emulate {
+        /// Which.
+        job: EmulateJob,
+    },
+    /// The emulated machine's end of the wire: what it receives follows; the answer has its answers.
+    Device {
+        /// Its clock, microseconds.
+        now_us: f64,
+        /// Whether the wire was unplugged before.
+        #[serde(default)]
+        is_unplugged: bool,
+    },
+    /// What the emulated machine has drawn.
+    Ink,
 }
 
 impl Studio {
@@ -76,8 +111,12 @@ impl Studio {
         let plain = |json: Value| Reply { json, columns: Vec::new() };
         match request {
             Request::Catalogue => Ok(plain(catalogue())),
-            Request::Open { name } => {
-                self.open(&name, bytes);
+            Request::Open { name, adds } => {
+                if adds {
+                    self.add(&name, bytes);
+                } else {
+                    self.open(&name, bytes);
+                }
                 Ok(plain(json!({})))
             }
             Request::Drawing { job } => self.drawing(&job),
@@ -96,6 +135,46 @@ impl Studio {
                 let commands = outputs.iter().map(command).collect::<Result<Vec<Value>, Problems>>()?;
                 Ok(plain(json!({ "commands": commands })))
             }
+            other => self.answer_wire(other, bytes),
+        }
+    }
+}
+
+impl Studio {
+    /// Requests of the two ends of a wire.
+    fn answer_wire(&mut self, request: Request, bytes: &[u8]) -> Result<Reply, Problems> {
+        let plain = |json: Value| Reply { json, columns: Vec::new() };
+        let none = || Problem::new(About::Option, "nothing is being sent");
+        match request {
+            Request::Send { job } => {
+                self.sending = Some(Sending::new(&job, bytes)?);
+                Ok(plain(json!({})))
+            }
+            Request::Wire { now_us, event, is_clear } => {
+                let sending = self.sending.as_mut().ok_or_else(none)?;
+                let step = sending.step(now_us.max(0.0) as u64, event, bytes, is_clear);
+                Ok(Reply {
+                    json: json!({ "wake_us": step.wake_us, "state": step.state }),
+                    columns: step.bytes,
+                })
+            }
+            Request::Emulate { job } => {
+                self.emulated = Some(Emulated::new(&job)?);
+                Ok(plain(json!({})))
+            }
+            Request::Device { now_us, is_unplugged } => {
+                let emulated = self.emulated.as_mut().ok_or_else(none)?;
+                if is_unplugged {
+                    emulated.unplug();
+                }
+                let (json, columns) = emulated.step(now_us.max(0.0) as u64, bytes);
+                Ok(Reply { json, columns })
+            }
+            Request::Ink => {
+                let emulated = self.emulated.as_ref().ok_or_else(none)?;
+                Ok(Reply { json: json!({}), columns: emulated.ink().into_bytes() })
+            }
+            _ => Err(none().into()),
         }
     }
 }
@@ -114,6 +193,7 @@ fn catalogue() -> Value {
         "program": concat!("plotplan ", env!("CARGO_PKG_VERSION")),
         "presets": presets.collect::<Vec<_>>(),
         "formats": formats(),
+        "protocols": protocols(),
     })
 }
 

@@ -1,6 +1,9 @@
 //! An opened drawing, and its last plan.
 
+use std::collections::BTreeSet;
+
 use compiler::import::{self, Document, Page};
+use compiler::layout::{self, Part};
 use compiler::machine_file::MachineFile;
 use compiler::pipeline::{self, Request, Step};
 use compiler::report::{CertificateReport, DrawingReport, Finding, Summary};
@@ -13,21 +16,32 @@ use planner::{PlacementOptions, PlanError, Scale};
 use serde_json::{Value, json};
 use viewer::Columns;
 
+use crate::emulated::Emulated;
 use crate::job::Job;
 use crate::problem::{About, Problem, Problems};
+use crate::sending::Sending;
 
 /// Chords of outlines deviate from the drawing by at most this, mm.
 const OUTLINE_MM: f64 = 0.05;
 
-/// The worker of a page: a drawing, and the last plan made of it.
-#[derive(Debug, Default)]
-pub struct Studio {
+/// A drawing's file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct File {
     name: String,
     bytes: Vec<u8>,
-    /// The drawing as it was read with these options.
-    read: Option<(import::Options, Document)>,
+}
+
+/// The worker of a page: a drawing of one file or several, and the last plan made of it.
+#[derive(Debug, Default)]
+pub struct Studio {
+    files: Vec<File>,
+    /// The files as they were read with these options.
+    read: Option<(import::Options, Vec<Document>)>,
     /// The last plan that was no draft.
     planned: Option<Planned>,
+    /// The conversation with a machine, and the emulated machine at the other end of a rehearsal.
+    pub(crate) sending: Option<Sending>,
+    pub(crate) emulated: Option<Emulated>,
 }
 
 /// An answer: a JSON object, and columns that it describes for `viewer/js/columns.js`.
@@ -59,48 +73,101 @@ pub(crate) struct Planned {
     beyond_sheet_mm: f64,
 }
 
+impl File {
+    fn source(&self) -> SourceFile<'_> {
+        SourceFile { name: &self.name, path: &self.name, bytes: &self.bytes }
+    }
+}
+
 impl Studio {
-    /// Opens a drawing's file in place of the one before.
+    /// Opens a drawing's file in place of those before.
     pub fn open(&mut self, name: &str, bytes: &[u8]) {
-        *self = Self { name: name.to_owned(), bytes: bytes.to_vec(), read: None, planned: None };
+        self.files.clear();
+        self.add(name, bytes);
     }
 
-    /// The name of the drawing's file.
-    pub fn name(&self) -> &str {
-        &self.name
+    /// Lays another file over those that are open.
+    pub fn add(&mut self, name: &str, bytes: &[u8]) {
+        self.files.push(File { name: name.to_owned(), bytes: bytes.to_vec() });
+        (self.read, self.planned) = (None, None);
     }
 
-    /// SHA-256 of the drawing's file.
+    /// What to call the drawing: the files' names.
+    pub fn name(&self) -> String {
+        self.names().collect::<Vec<_>>().join(" + ")
+    }
+
+    /// The files' names.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().map(|file| &*file.name)
+    }
+
+    /// SHA-256 of the files, one after the other.
     pub(crate) fn sha256(&self) -> String {
-        import::sha256(&self.bytes)
+        import::sha256(&self.files.iter().map(|file| &*file.bytes).collect::<Vec<_>>().concat())
     }
 
-    /// The drawing's file, read as the job asks, and the page that the job asks for.
-    pub(crate) fn page(&mut self, job: &Job) -> Result<(Page, usize), Problems> {
-        if self.bytes.iter().all(u8::is_ascii_whitespace) {
-            return Err(Problem::new(About::Drawing, format!("{} is empty", self.name)).into());
-        }
-        if plan::file::is_plan(&self.bytes) {
-            return Err(Problem::new(About::Drawing, format!("{} is a plan, not a drawing", self.name))
-                .with_help("`plotplan preview` shows plans")
-                .into());
+    /// The last plan of this job.
+    pub(crate) fn planned_before(&self, job: &Job) -> Option<&Planned> {
+        self.planned.as_ref().filter(|planned| planned.job == *job)
+    }
+
+    /// Reads the files as the job asks.
+    fn read(&mut self, job: &Job) -> Result<&[Document], Problems> {
+        for File { name, bytes } in &self.files {
+            if bytes.iter().all(u8::is_ascii_whitespace) {
+                return Err(Problem::new(About::Drawing, format!("{name} is empty")).into());
+            }
+            if plan::file::is_plan(bytes) {
+                return Err(Problem::new(About::Drawing, format!("{name} is a plan, not a drawing"))
+                    .with_help("`plotplan preview` shows plans")
+                    .into());
+            }
         }
         let options = job.options.reading()?;
         if self.read.as_ref().is_none_or(|(given, _)| *given != options) {
-            let read = import::read(&self.bytes, &options);
-            let document =
-                read.map_err(|error| Problem::new(About::Drawing, format!("{}: {error}", self.name)))?;
-            self.read = Some((options, document));
+            let formats: Vec<&str> = self.files.iter().map(|file| import::format(&file.bytes)).collect();
+            let read = self.files.iter().zip(&formats).map(|(File { name, bytes }, format)| {
+                import::read(bytes, &options.for_format(format, &formats))
+                    .map_err(|error| Problem::new(About::Drawing, format!("{name}: {error}")).into())
+            });
+            let documents = read.collect::<Result<Vec<Document>, Problems>>()?;
+            self.read = Some((options, documents));
         }
+        Ok(self.read.as_ref().map_or(&[][..], |(_, documents)| documents))
+    }
+
+    /// The drawing as the job reads and arranges it, and the number of the page that the job asks for.
+    pub(crate) fn page(&mut self, job: &Job) -> Result<(Page, usize), Problems> {
         let number = job.options.page()?;
-        let pages = self.read.as_ref().map_or(&[][..], |(_, document)| &document.pages);
-        let page = pages.get(number - 1).cloned().ok_or_else(|| Problem {
-            option: Some("page"),
-            ..Problem::new(
-                About::Option,
-                format!("{} has {} pages, not page {number}", self.name, pages.len()),
-            )
-        })?;
+        let layout = job.options.layout()?;
+        self.read(job)?;
+        let documents = self.read.as_ref().map_or(&[][..], |(_, documents)| documents);
+        let mut parts = Vec::new();
+        for (file, document) in self.files.iter().zip(documents) {
+            let pages = &document.pages;
+            let page = pages.get(number - 1).cloned().ok_or_else(|| Problem {
+                option: Some("page"),
+                ..Problem::new(
+                    About::Option,
+                    format!("{} has {} pages, not page {number}", file.name, pages.len()),
+                )
+            })?;
+            parts.push(Part { page, length: file.bytes.len(), format: document.format });
+        }
+        let pens: BTreeSet<u16> =
+            parts.iter().flat_map(|part| part.page.drawing.pens()).map(|pen| pen.0).collect();
+        let (page, _) = layout::compose(parts, &layout);
+        if page.drawing.is_empty() && !pens.is_empty() {
+            let pens: Vec<String> = pens.iter().map(u16::to_string).collect();
+            let what = format!(
+                "--only-pens {} leaves nothing: {} draws with pens {}",
+                job.options.only_pens,
+                self.name(),
+                pens.join(", ")
+            );
+            return Err(Problem { option: Some("only-pens"), ..Problem::new(About::Option, what) }.into());
+        }
         Ok((page, number))
     }
 
@@ -108,23 +175,27 @@ impl Studio {
     /// drawing of another format is opened.
     pub(crate) fn settled(&self, job: &Job) -> Job {
         let mut job = job.clone();
-        if import::format(&self.bytes) != "SVG" {
+        if self.files.iter().all(|file| import::format(&file.bytes) != "SVG") {
             (job.options.pens, job.options.hatch) = (String::new(), String::new());
             job.options.outline_fills = false;
         }
         job
     }
 
-    /// What was found in the drawing's file.
+    /// What was found in the drawing's files.
     fn findings(&self) -> Vec<Finding> {
-        let found = self.read.as_ref().map_or(&[][..], |(_, document)| &document.diagnostics);
-        found.iter().map(|diagnostic| Finding::of(&self.name, diagnostic)).collect()
+        let documents = self.read.as_ref().map_or(&[][..], |(_, documents)| documents);
+        let of = |(file, document): (&File, &Document)| -> Vec<Finding> {
+            document.diagnostics.iter().map(|diagnostic| Finding::of(&file.name, diagnostic)).collect()
+        };
+        self.files.iter().zip(documents).flat_map(of).collect()
     }
 
     /// Stops where the drawing lacks something or draws nothing, as the program does.
     pub(crate) fn refuse_unusable(&self, page: &Page) -> Result<(), Problems> {
-        let Some((_, document)) = &self.read else { return Ok(()) };
-        let errors = document.diagnostics.iter().filter(|found| found.severity == import::Severity::Error);
+        let Some((_, documents)) = &self.read else { return Ok(()) };
+        let found = documents.iter().flat_map(|document| &document.diagnostics);
+        let errors = found.filter(|found| found.severity == import::Severity::Error);
         let problems: Vec<Problem> = errors
             .map(|found| Problem {
                 help: found.help.clone(),
@@ -136,10 +207,28 @@ impl Studio {
             return Err(Problems(problems));
         }
         if page.drawing.is_empty() {
-            let what = format!("{} draws nothing: no ink in its {}", self.name, document.size);
+            let sizes: Vec<&str> = documents.iter().map(|document| &*document.size).collect();
+            let what = format!("{} draws nothing: no ink in its {}", self.name(), sizes.join(" and "));
             return Err(Problem::new(About::Drawing, what).into());
         }
         Ok(())
+    }
+
+    /// What the drawing is: of one file as it was read, of several as they lie over each other.
+    fn report(&self, page: &Page) -> Option<DrawingReport> {
+        let (_, documents) = self.read.as_ref()?;
+        if let [document] = &documents[..] {
+            return Some(DrawingReport::of(document));
+        }
+        let format = documents.first()?.format;
+        let is_one = documents.iter().all(|document| document.format == format);
+        Some(DrawingReport::of(&Document {
+            format: if is_one { format } else { "several formats" },
+            pages: vec![page.clone()],
+            diagnostics: Vec::new(),
+            size: format!("{} files", documents.len()),
+            facts: Vec::new(),
+        }))
     }
 
     /// The drawing: its report and findings, and as columns its outlines: `count` points and the `pen` of
@@ -163,10 +252,17 @@ impl Studio {
         for (name, values) in [("count", &counts), ("pen", &pens), ("x", &x), ("y", &y)] {
             columns.numbers(name, values);
         }
-        let report = self.read.as_ref().map(|(_, document)| DrawingReport::of(document));
+        let report = self.report(&page);
+        // The pens that can be left out are those of the files.
+        let of_file = |document: &Document| document.pages.get(number - 1).map(|page| page.drawing.pens());
+        let documents = self.read.as_ref().map_or(&[][..], |(_, documents)| documents);
+        let all_pens: BTreeSet<u16> =
+            documents.iter().filter_map(of_file).flatten().map(|pen| pen.0).collect();
         let bounds = page.drawing.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
-            "name": self.name,
+            "name": self.name(),
+            "files": self.names().collect::<Vec<_>>(),
+            "pens": all_pens,
             "page": number,
             "bounds_mm": bounds,
             "report": report,
@@ -181,7 +277,7 @@ impl Studio {
     /// # Errors
     /// What is wrong with the machine file.
     pub fn machine(&self, job: &Job) -> Result<Reply, Problems> {
-        let (_, machine) = job.machine.read()?;
+        let (_, machine) = job.read_machine()?;
         Ok(standing(&machine, "No drawing"))
     }
 
@@ -192,13 +288,18 @@ impl Studio {
     /// What is wrong with the machine file, the drawing's file or the options.
     pub fn plan(&mut self, job: &Job, progress: &dyn Fn(Step)) -> Result<Reply, Problems> {
         let job = &self.settled(job);
-        let (_, machine) = job.machine.read()?;
+        let (_, machine) = job.read_machine()?;
         let (page, _) = self.page(job)?;
         self.refuse_unusable(&page)?;
-        match self.planned(job, progress) {
-            Ok(planned) => Ok(self.view(&planned)),
+        let reply = if job.draft {
+            self.draft(job, &page, &machine)
+        } else {
+            self.planned(job, progress).map(|planned| self.view(&planned))
+        };
+        match reply {
+            Ok(reply) => Ok(reply),
             Err(problems) => {
-                let reply = standing(&machine, &self.name);
+                let reply = standing(&machine, &self.name());
                 let placed = job
                     .options
                     .placement()
@@ -223,10 +324,10 @@ impl Studio {
 
     /// Plans the drawing. A plan that was made before is made again only if the job is another one.
     pub(crate) fn planned(&mut self, job: &Job, progress: &dyn Fn(Step)) -> Result<Planned, Problems> {
-        if let Some(planned) = self.planned.as_ref().filter(|planned| planned.job == *job) {
+        if let Some(planned) = self.planned_before(job) {
             return Ok(planned.clone());
         }
-        let (file, machine) = job.machine.read()?;
+        let (file, machine) = job.read_machine()?;
         let (page, page_number) = self.page(job)?;
         self.refuse_unusable(&page)?;
         let request = job.request(&page, &machine)?;
@@ -258,16 +359,14 @@ impl Studio {
             certificate,
             beyond_sheet_mm,
         };
-        if !job.draft {
-            self.planned = Some(planned.clone());
-        }
+        self.planned = Some(planned.clone());
         Ok(planned)
     }
 
     /// What the viewer shows of a plan.
     pub(crate) fn view_of<'a>(&'a self, planned: &'a Planned) -> View<'a> {
         View {
-            title: self.name.clone(),
+            title: self.name(),
             machine: &planned.machine,
             header: &planned.header,
             rows: &planned.rows,
@@ -277,7 +376,7 @@ impl Studio {
                 placed: &planned.placed,
                 pens: &planned.page.pens,
                 pen_speeds: &planned.request.pen_speeds,
-                files: vec![SourceFile { name: &self.name, path: &self.name, bytes: &self.bytes }],
+                files: self.files.iter().map(File::source).collect(),
             }),
             tolerance_mm: planned.request.tolerance_mm,
             summary: Some(planned.summary.clone()),
@@ -287,20 +386,51 @@ impl Studio {
         }
     }
 
-    fn view(&self, planned: &Planned) -> Reply {
-        let mut view = self.view_of(planned);
-        if planned.job.draft {
-            // The distance of each row from the drawing, and the bytes of each stroke, come with the full plan.
-            view.drawing = None;
-        }
+    /// A draft for the viewer. It has no certificate; the bytes of each stroke and the distance of each row from
+    /// the drawing come with the full plan.
+    fn draft(&self, job: &Job, page: &Page, machine: &Machine) -> Result<Reply, Problems> {
+        let request = job.request(page, machine)?;
+        let draft = pipeline::draft(&page.drawing, machine, &request)
+            .map_err(|error| refusal(&page.drawing, machine, &request, &error))?;
+        let (rows, exact): (Vec<Row>, Vec<[f64; 2]>) =
+            draft.trajectory.rows().map(|row| (row.row, row.exact)).unzip();
+        let placed = draft.trajectory.drawing();
+        let view = View {
+            title: self.name(),
+            machine,
+            header: &draft.header,
+            rows: &rows,
+            exact: Some(&exact),
+            drawing: None,
+            tolerance_mm: request.tolerance_mm,
+            summary: None,
+            certificate: None,
+            findings: self.findings(),
+            prediction: None,
+        };
         let (meta, columns) = view.data_into(Columns::quick());
+        let ink = placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
+        let json = json!({
+            "meta": meta,
+            "is_draft": true,
+            "placement": draft.header.placement,
+            "ink_mm": ink,
+            "beyond_sheet_mm": draft.beyond_sheet_mm,
+            "problems": [],
+        });
+        Ok(Reply { json, columns: columns.bytes().to_vec() })
+    }
+
+    fn view(&self, planned: &Planned) -> Reply {
+        let (meta, columns) = self.view_of(planned).data_into(Columns::quick());
         let ink = planned.placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
             "meta": meta,
-            "is_draft": planned.job.draft,
+            "is_draft": false,
             "placement": planned.header.placement,
             "ink_mm": ink,
             "beyond_sheet_mm": planned.beyond_sheet_mm,
+            "best_place": planned.summary.best_place,
             "problems": [],
         });
         Reply { json, columns: columns.bytes().to_vec() }

@@ -28,6 +28,7 @@ export function rowAt(times, t) {
  * @property {[Float64Array, Float64Array]} q  motors, ticks
  * @property {[Float64Array, Float64Array] | null} lag  where the mechanism is against the motors, ticks; null
  *   without backlash
+ * @property {[Float64Array, Float64Array] | null} off  as in `track`
  * @property {Float32Array} x  the pen over the paper, machine mm
  * @property {Float32Array} y
  * @property {Int32Array} first  the first row of each stroke
@@ -76,16 +77,22 @@ export function track(t, pens, q, position, off, play) {
     }
   }
   if (last.length < first.length) last.push(count - 1);
-  return { t, pen, q, lag, x, y, first: Int32Array.from(first), last: Int32Array.from(last) };
+  return { t, pen, q, off, lag, x, y, first: Int32Array.from(first), last: Int32Array.from(last) };
 }
 
-/** Where the mechanism is at a time, in the motors' ticks. @param {Track} of @param {number} t @returns {[number, number]} */
+/**
+ * Where the mechanism is at a time, in the motors' ticks: a machine that moves in whole ticks stands on those of
+ * its rows, so that its pen is on the ink.
+ * @param {Track} of @param {number} t @returns {[number, number]}
+ */
 export function motorsAt(of, t) {
   const row = rowAt(of.t, t);
   const next = Math.min(row + 1, of.t.length - 1);
   const span = of.t[next] - of.t[row];
   const share = span > 0 ? Math.min(Math.max((t - of.t[row]) / span, 0), 1) : 0;
-  const load = (/** @type {0 | 1} */ k, /** @type {number} */ index) => of.q[k][index] + (of.lag?.[k][index] ?? 0);
+  const { q, off, lag } = of;
+  const load = (/** @type {0 | 1} */ k, /** @type {number} */ index) =>
+    (off ? Math.floor(q[k][index] + 0.5) + (off[k][index] ?? 0) : q[k][index]) + (lag?.[k][index] ?? 0);
   const at = (/** @type {0 | 1} */ k) => load(k, row) + share * (load(k, next) - load(k, row));
   return [at(0), at(1)];
 }

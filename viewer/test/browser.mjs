@@ -121,11 +121,14 @@ export async function onStudio(options, check) {
   }
 }
 
-/** Waits until the page has drawn all that it had to. */
+/** Waits until the page has drawn all that it had to: the studio's compiler is idle, frames and timers are done. */
 export async function settled(page) {
-  await page.waitForTimeout(150);
-  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-  await page.waitForTimeout(250);
+  await page.waitForFunction(() => {
+    const compiler = window.plotplanStudio?.compiler;
+    return !compiler || (!compiler.working && compiler.waiting.length === 0);
+  });
+  // A frame, the timers that it sets, and the frame that they lead to.
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => setTimeout(() => requestAnimationFrame(() => setTimeout(done, 30)), 30))));
 }
 
 /** Compares a picture of the page, at half its size, with its reference. */

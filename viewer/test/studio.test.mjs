@@ -1,13 +1,14 @@
 // The studio as a person uses it, served by the program: `cargo xtask web-test` builds it and runs this.
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import fs from "node:fs";
 import { createRequire } from "node:module";
 import os from "node:os";
 import path from "node:path";
 import { after, before, test } from "node:test";
 
+import { corners, mapped } from "../../studio/web/js/area.js";
 import { at, smooth } from "../../studio/web/js/smooth.js";
 import { PROGRAM, close, compare, onStudio, serve, settled } from "./browser.mjs";
 
@@ -380,7 +381,7 @@ test("plans without the server once it is open", () => onStudio({ mayFail: true 
 
 test("everything by keyboard, with the focus visible", () => onStudio({}, async (page) => {
   await page.focus("#tab-drawing");
-  for (const tab of ["place", "machine", "output", "drawing"]) {
+  for (const tab of ["place", "machine", "output", "send", "drawing"]) {
     await page.keyboard.press("ArrowRight");
     assert.equal(await page.evaluate(() => document.activeElement.id), `tab-${tab}`);
     assert.ok(await page.locator(`#panel-${tab}`).isVisible());
@@ -413,7 +414,7 @@ test("axe-core finds nothing in the studio", async () => {
       await planned(page, () => page.click("#example"));
       // Both schemes and both widths; all tabs in two of the four.
       const isWhole = (scheme === "light") === (width > 1000);
-      for (const tab of isWhole ? ["drawing", "place", "machine", "output"] : ["machine"]) {
+      for (const tab of isWhole ? ["drawing", "place", "machine", "output", "send"] : ["machine"]) {
         await page.click(`#tab-${tab}`);
         if (tab === "machine") {
           await page.fill("#toml", "name = 3\n");
@@ -429,9 +430,248 @@ test("axe-core finds nothing in the studio", async () => {
   }
 });
 
+/** A small drawing of two pens: some seconds on an arm. */
+const SMALL = Buffer.from("IN;SP1;PU400,400;PD1200,400,1200,800;PU;SP2;PU400,800;PD600,900;PU;");
+
+test("page options have the bytes of the program", () => onStudio({}, async (page) => {
+  const change = (id, value) => planned(page, async () => {
+    await page.fill(id, value);
+    await page.locator(id).blur();
+  });
+  const same = async (word, files) => {
+    await page.click("#tab-output");
+    await page.waitForFunction((word) => document.getElementById("command").textContent.includes(word), word);
+    const { bytes } = await saved(page, () => page.click("#download"));
+    assert.ok(bytes.equals(ran((await commands(page))[0], files)), word);
+  };
+  await drop(page, "a.hpgl", SMALL);
+  const one = { "a.hpgl": SMALL };
+  await page.click("#tab-place");
+  await change("#paper", "A5,landscape");
+  await same("--paper=A5,landscape", one);
+  await page.click("#tab-place");
+  await change("#columns", "2");
+  await page.click("#place-fit");
+  await change("#gap", "3");
+  await same("--copies=2x1 --gap=3mm", one);
+  await page.click("#tab-machine");
+  await planned(page, () => page.selectOption("#law", "trapezoid"));
+  await same("--law=trapezoid", one);
+  await page.click("#tab-drawing");
+  await planned(page, () => page.locator("#only-pens input").first().uncheck());
+  await same("--only-pens=2", one);
+  await page.click("#tab-drawing");
+  await planned(page, () => page.locator("#only-pens input").first().check());
+  await page.click("#tab-place");
+  await planned(page, () => page.click("#place-time"));
+  assert.match(await page.locator("#place-state").textContent(), /^[0-9.]+ s; .* places were compared/);
+  await same("--place=best", one);
+  // Two files that lie over each other.
+  const both = await page.evaluate(async (files) => {
+    const data = new DataTransfer();
+    for (const [name, base64] of files) data.items.add(new File([Uint8Array.from(atob(base64), (char) => char.charCodeAt(0))], name));
+    document.body.dispatchEvent(new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
+    await new Promise((next) => setTimeout(next, 300));
+    return window.plotplanStudio.state.others.length;
+  }, [["a.hpgl", SMALL.toString("base64")], ["rings.svg", RINGS.toString("base64")]]);
+  assert.equal(both, 1);
+  await page.click("#tab-place");
+  await planned(page, () => page.click("#place-fit"));
+  await page.waitForFunction(() => document.getElementById("title").textContent === "a.hpgl + rings.svg");
+  await same("a.hpgl rings.svg", { ...one, "rings.svg": RINGS });
+}));
+
+/** Bytes of a log's line, as Rust escapes them. */
+function unescaped(text) {
+  const plain = { n: "\n", r: "\r", t: "\t" };
+  return text.replace(/\\(x[0-9a-f]{2}|.)/g, (_, one) => (one.length === 3 ? String.fromCharCode(parseInt(one.slice(1), 16)) : plain[one] ?? one));
+}
+
+/** What `plotplan send` sends to the emulated machine. */
+async function sentByProgram(protocol, plan, machine) {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), "plotplan-send-"));
+  const [file, link, log] = ["plan.ticks", "tty", "log"].map((name) => path.join(folder, name));
+  fs.writeFileSync(file, plan);
+  const emulator = spawn(PROGRAM, ["emulate", "--protocol", protocol, "--machine", machine, "--link", link, "--speedup", "20"], { stdio: ["ignore", "pipe", "ignore"] });
+  try {
+    // It prints the name of its port when that is there.
+    await new Promise((done) => emulator.stdout.once("data", done));
+    execFileSync(PROGRAM, ["send", file, "--port", link, "--protocol", protocol, "--log", log, "--quiet"]);
+    const lines = fs.readFileSync(log, "utf8").split("\n").map((line) => /^[0-9.]+ > (.*)$/.exec(line)).filter((found) => found);
+    return unescaped(lines.map((found) => found[1]).join(""));
+  } finally {
+    emulator.kill();
+    fs.rmSync(folder, { recursive: true });
+  }
+}
+
+/** Gives the page a serial port with an emulated machine; `machine` is that port. */
+function plugIn(page, protocol, speedup) {
+  return page.evaluate(async ([protocol, speedup]) => {
+    const { EmulatedPort } = await import("/js/emulated.js");
+    const { compiler, state } = window.plotplanStudio;
+    const machine = new EmulatedPort(compiler.module, { protocol, machine: state.machine, homed: true }, speedup);
+    const { open } = machine;
+    machine.open = function (options) {
+      window.opened = options;
+      if (window.isAway) return Promise.reject(new DOMException("no such device", "NetworkError"));
+      return open.call(this);
+    };
+    window.machine = machine;
+    const serial = Object.assign(new EventTarget(), { requestPort: async () => {
+      if (window.isCancelled) throw new DOMException("nothing was chosen", "NotFoundError");
+      return machine;
+    } });
+    Object.defineProperty(navigator, "serial", { value: serial, configurable: true });
+  }, [protocol, speedup]);
+}
+
+const received = (page) => page.evaluate(() => window.machine.received.map((bytes) => String.fromCharCode(...bytes)).join(""));
+
+/** Sends, does something meanwhile, and waits for the end; how it ended. */
+async function sent(page, act = async () => {}) {
+  const count = () => Number((document.documentElement.dataset.sent ?? "0").split(" ")[0]);
+  const before = await page.evaluate(count);
+  await page.click("#send");
+  await act();
+  await page.waitForFunction((before) => Number((document.documentElement.dataset.sent ?? "0").split(" ")[0]) > before, before, { timeout: 30_000 });
+  return page.evaluate(() => document.documentElement.dataset.sent.split(" ")[1]);
+}
+
+const says = (page, text) => page.waitForFunction((text) => document.getElementById("send-state").textContent.includes(text), text);
+
+test("sends over a serial port what the program sends", () => onStudio({}, async (page) => {
+  for (const [protocol, machine] of [["ticks", "coaxial"], ["gcode", "cartesian"]]) {
+    await page.click("#tab-machine");
+    if (machine !== "coaxial") await planned(page, () => page.selectOption("#preset", machine));
+    await drop(page, "a.hpgl", SMALL);
+    await plugIn(page, protocol, 20);
+    await page.click("#tab-output");
+    await page.selectOption("#format", "ticks");
+    const plan = await saved(page, () => page.click("#download"));
+    await page.click("#tab-send");
+    await page.selectOption("#send-to", "port");
+    await page.selectOption("#protocol", protocol);
+    await page.fill("#baud", "250000");
+    assert.equal(await sent(page), "done", await page.locator("#send-state").textContent());
+    assert.match(await page.locator("#send-state").textContent(), /^Sent \d+ lines/);
+    assert.deepEqual(await page.evaluate(() => window.opened), { baudRate: 250000, flowControl: "none", bufferSize: 4096 });
+    // Questions for the state come as time passes; the plan's own bytes are the same.
+    const own = (text) => text.replaceAll("?", "").replace(/where\*\d+\n/g, "");
+    const [page_, program] = [own(await received(page)), own(await sentByProgram(protocol, plan.bytes, machine))];
+    assert.ok(page_.length > 500);
+    assert.equal(page_, program, protocol);
+    assert.match(await page.locator("#send-command").textContent(), new RegExp(`plotplan send a.ticks --port=PORT --protocol=${protocol} --baud=250000`));
+  }
+}));
+
+test("sending is paused, unplugged, stopped and resumed, and nothing is drawn twice", () => onStudio({}, async (page) => {
+  await drop(page, "a.hpgl", SMALL);
+  await page.click("#tab-send");
+  // The whole plan on a machine in the page.
+  await page.selectOption("#send-to", "fast");
+  assert.equal(await sent(page), "done");
+  const whole = await page.evaluate(() => window.plotplanStudio.sender.emulated.drawn());
+  await page.selectOption("#send-to", "port");
+  await plugIn(page, "ticks", 4);
+  const ended = await sent(page, async () => {
+    await page.click("#pause");
+    await says(page, "Paused with the pen up");
+    assert.equal(await page.locator("#pause").textContent(), "Continue");
+    await page.click("#pause");
+    await page.waitForFunction(() => document.getElementById("pause").textContent === "Pause");
+    await page.evaluate(() => {
+      window.isAway = true;
+      window.machine.unplug();
+    });
+    await says(page, "The port is away");
+    await page.evaluate(() => (window.isAway = false));
+    await says(page, "Sending");
+    await page.click("#stop");
+  });
+  assert.equal(ended, "stopped", await page.locator("#send-state").textContent());
+  assert.match(await page.locator("#send-state").textContent(), /Stopped at row \d+ with the pen up.*Send resumes there/);
+  const row = Number(await page.locator("#from-row").inputValue());
+  assert.ok(row > 0, `row ${row}`);
+  assert.equal(await sent(page), "done", await page.locator("#send-state").textContent());
+  const places = (ink) => [...new Set(ink.trim().split("\n").slice(1).map((line) => line.split(",").slice(1).join(",")))].sort();
+  assert.deepEqual(places(await page.evaluate(() => window.machine.drawn())), places(whole));
+}));
+
+test("errors of sending are shown", () => onStudio({}, async (page) => {
+  await drop(page, "a.hpgl", SMALL);
+  await page.click("#tab-send");
+  await plugIn(page, "ticks", 20);
+  await page.selectOption("#send-to", "port");
+  await page.evaluate(() => (window.isCancelled = true));
+  await page.click("#send");
+  await says(page, "No port was chosen.");
+  await page.evaluate(() => Object.assign(window, { isCancelled: false, isAway: true }));
+  assert.equal(await sent(page), "failed");
+  await says(page, "The port cannot be opened: no such device");
+  await page.evaluate(() => (window.isAway = false));
+  await page.fill("#from-row", "99999");
+  assert.equal(await sent(page), "failed");
+  await says(page, "row");
+  await page.fill("#from-row", "");
+  await page.selectOption("#protocol", "halstreamer").catch(() => {});
+  await page.selectOption("#protocol", "raw");
+  await page.selectOption("#send-to", "emulated");
+  await says(page, "no emulated machine");
+  assert.ok(await page.locator("#send").isDisabled());
+}));
+
+test("two points calibrate the area of the pad", () => onStudio({}, async (page) => {
+  await planned(page, () => page.click("#sketch"));
+  await page.click("#area-begin");
+  const box = await page.locator("#front").boundingBox();
+  const press = (x, y) => page.mouse.click(box.x + x, box.y + y);
+  await press(100, 300);
+  await page.waitForFunction(() => document.getElementById("area-state").textContent.includes("opposite"));
+  await press(105, 295);
+  await page.waitForFunction(() => document.getElementById("area-state").textContent.includes("too near"));
+  await press(300, 100);
+  await page.waitForSelector("#area-fields:not([hidden])");
+  for (const [id, value] of [["area-x0", "20"], ["area-y0", "30"], ["area-x1", "120"], ["area-y1", "80"]]) {
+    await page.fill(`#${id}`, value);
+    await page.locator(`#${id}`).blur();
+  }
+  await page.fill("#smooth", "0");
+  await page.locator("#smooth").blur();
+  await planned(page, async () => {
+    await page.mouse.move(box.x + 100, box.y + 300);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 200, box.y + 200, { steps: 4 });
+    await page.mouse.move(box.x + 400, box.y + 50, { steps: 4 });
+    await page.mouse.up();
+  });
+  const [{ points }] = await page.evaluate(() => window.plotplanStudio.state.sketch);
+  assert.deepEqual(points.slice(0, 2), [20, 30]);
+  assert.ok(points.some((x, k) => k % 2 === 0 && Math.abs(x - 70) < 0.01 && Math.abs(points[k + 1] - 55) < 0.01), `${points}`);
+  assert.deepEqual(points.slice(-2), [120, 80]);
+  await page.reload();
+  await page.waitForSelector("html[data-planned]");
+  await page.click("#sketch");
+  assert.equal(await page.locator("#area-x1").inputValue(), "120");
+  await page.click("#area-end");
+  assert.ok(await page.locator("#area-fields").isHidden());
+}));
+
+test("the area maps its corners to theirs", () => {
+  const area = { pad: [10, 210, 110, 10], sheet: [5, 6, 55, 106] };
+  assert.deepEqual(mapped(area, 10, 210), [5, 6]);
+  assert.deepEqual(mapped(area, 110, 10), [55, 106]);
+  assert.deepEqual(mapped(area, 60, 110), [30, 56]);
+  assert.deepEqual(mapped(area, 500, 500), [55, 6]);
+  // A pad that lies as the sheet does, whichever corner is pressed first.
+  assert.deepEqual(corners([0, 100, 200, 0], 80, 40), [0, 0, 80, 40]);
+  assert.deepEqual(corners([200, 0, 0, 100], 80, 40), [80, 40, 0, 0]);
+  assert.deepEqual(corners([0, 0, 200, 100], 80, 40), [0, 40, 80, 0]);
+});
+
 test("the studio at 360 px, with touch", () => onStudio({ width: 360, height: 740, touch: true }, async (page) => {
   await planned(page, () => page.locator("#example").tap());
-  for (const tab of ["drawing", "place", "machine", "output"]) {
+  for (const tab of ["drawing", "place", "machine", "output", "send"]) {
     await page.locator(`#tab-${tab}`).tap();
     const widths = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
     assert.equal(widths[0], widths[1], tab);
@@ -462,6 +702,8 @@ test("screenshots of the studio", async () => {
         await shot("place");
         await page.click("#tab-machine");
         await shot("machine");
+        await page.click("#tab-send");
+        await shot("send");
       });
     }
   }

@@ -208,6 +208,49 @@ pub fn overlay(pages: Vec<(Page, usize)>) -> (Page, Vec<ColorConflict>) {
     (all, conflicts)
 }
 
+/// The page of one of several drawings.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The page as it was read.
+    pub page: Page,
+    /// The length of its file, bytes.
+    pub length: usize,
+    /// The format of its file.
+    pub format: &'static str,
+}
+
+/// One page of several drawings that lie over each other, the first one first: pens chosen and
+/// renumbered, colours numbered together, then copied. A single drawing is only arranged.
+pub fn compose(mut parts: Vec<Part>, layout: &Layout) -> (Page, Vec<ColorConflict>) {
+    // Numbers that an option names are those of the files.
+    let are_free = parts.len() > 1 && layout.pen_map.is_empty() && layout.only_pens.is_none();
+    let is_by_color = |part: &Part| are_free && part.format == "SVG" && is_numbered_by_color(&part.page);
+    let by_color: Vec<bool> = parts.iter().map(is_by_color).collect();
+    for part in &mut parts {
+        layout.apply_pens(&mut part.page);
+    }
+    let lengths: Vec<usize> = parts.iter().map(|part| part.length).collect();
+    let mut pages: Vec<Page> = parts.into_iter().map(|part| part.page).collect();
+    if pages.len() > 1 {
+        number_colors_together(&mut pages, &by_color);
+    }
+    let (mut page, conflicts) = match <[Page; 1]>::try_from(pages) {
+        Ok([page]) => (page, Vec::new()),
+        Err(pages) => overlay(pages.into_iter().zip(lengths).collect()),
+    };
+    layout.apply_copies(&mut page.drawing);
+    (page, conflicts)
+}
+
+/// Whether an SVG's pens are numbered by colour: it has at most one layer, and that has no number.
+fn is_numbered_by_color(page: &Page) -> bool {
+    let mut names = page.pens.values().filter_map(|pen| pen.name.as_deref());
+    let Some(first) = names.next() else { return true };
+    let text = first.trim_start_matches(['!', ' ']).to_ascii_lowercase();
+    let has_number = text.starts_with("pen") || text.starts_with(|first: char| first.is_ascii_digit());
+    !has_number && names.all(|name| name == first)
+}
+
 #[cfg(test)]
 mod tests {
     use drawing::{Point, Stroke};

@@ -69,6 +69,27 @@ pub fn hatch(text: &str) -> Result<import::Hatch, String> {
     Ok(import::Hatch { spacing_mm, angle_rad: angle(direction)? })
 }
 
+/// Numbers of pens with commas between.
+///
+/// # Errors
+/// What is expected.
+pub fn pens(text: &str) -> Result<Vec<u16>, String> {
+    let what = "expected numbers of pens with commas between, such as 2,1";
+    let pen = |text: &str| text.trim().parse().ok().filter(|pen| *pen > 0).ok_or_else(|| what.to_owned());
+    text.split(',').map(pen).collect()
+}
+
+/// Columns and rows of a grid.
+///
+/// # Errors
+/// What is expected.
+pub fn grid(text: &str) -> Result<(u16, u16), String> {
+    let what = "expected columns and rows such as 3x2, from 1 to 1000";
+    let (columns, rows) = text.split_once('x').ok_or(what)?;
+    let count = |text: &str| text.trim().parse::<u16>().ok().filter(|n| (1..=1000).contains(n)).ok_or(what);
+    Ok((count(columns)?, count(rows)?))
+}
+
 /// A time in s.
 ///
 /// # Errors

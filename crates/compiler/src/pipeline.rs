@@ -401,6 +401,53 @@ struct Planned<'a> {
     certificate: Certificate,
 }
 
+/// The header of a plan's table.
+fn header_of(
+    trajectory: &Trajectory<'_>,
+    placement: Affine,
+    machine: &Machine,
+    request: &Request,
+) -> Header {
+    Header {
+        machine: machine.name().to_owned(),
+        motors: header_motors(machine),
+        placement: placement.as_coeffs(),
+        period_us: request.period_us,
+        lift_overlap_us: (request.lift_overlap_s * 1e6).round() as u64,
+        rounding: request.rounding,
+        pen_colors: request.pen_colors.clone(),
+        rows: trajectory.row_count(),
+        duration_us: trajectory.duration_us(),
+    }
+}
+
+/// A plan that is only shown: it has no certificate, and is not to be drawn.
+#[derive(Clone, Debug)]
+pub struct Draft<'a> {
+    /// The plan.
+    pub trajectory: Trajectory<'a>,
+    /// The header of its table.
+    pub header: Header,
+    /// How far ink reaches beyond the sheet, mm.
+    pub beyond_sheet_mm: f64,
+}
+
+/// Places the drawing and plans it in the file's order, without a search and without verification.
+///
+/// # Errors
+/// As [`compile`].
+pub fn draft<'a>(
+    drawing: &Drawing,
+    machine: &'a Machine,
+    request: &Request,
+) -> Result<Draft<'a>, PlanError> {
+    let Placed { placement, drawing: placed, beyond_sheet_mm } =
+        place(drawing, machine, &request.placement, request.crop)?;
+    let trajectory = plan(machine, placed, &planner_settings(request), &|_| {})?;
+    let header = header_of(&trajectory, placement, machine, request);
+    Ok(Draft { trajectory, header, beyond_sheet_mm })
+}
+
 /// Plans an ordered drawing, and certifies the plan against the placed one.
 fn planned<'a>(
     placed: &Drawing,
@@ -413,18 +460,7 @@ fn planned<'a>(
     progress(Step::Planning(0, ordered.strokes.len()));
     let trajectory = plan(machine, ordered, &planner_settings(request), progress)?;
     let ordered = trajectory.drawing();
-
-    let header = Header {
-        machine: machine.name().to_owned(),
-        motors: header_motors(machine),
-        placement: placement.as_coeffs(),
-        period_us: request.period_us,
-        lift_overlap_us: (request.lift_overlap_s * 1e6).round() as u64,
-        rounding: request.rounding,
-        pen_colors: request.pen_colors.clone(),
-        rows: trajectory.row_count(),
-        duration_us: trajectory.duration_us(),
-    };
+    let header = header_of(&trajectory, placement, machine, request);
     // Against the drawing in the file's order, so that anything ordering lost or changed shows. Where
     // ordering provably changed only order and direction, against its result: where strokes crowd,
     // ink that follows them from end to end is measured much faster.

@@ -202,22 +202,15 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     let layout = arguments.layout.to_layout();
     let options = arguments.options(fonts::of(arguments)?);
     let formats: Vec<&str> = inputs.0.iter().map(|input| import::format(&input.bytes)).collect();
-    let mut pages = Vec::new();
-    // Numbers that an option names are those of the files.
-    let are_free = arguments.layout.pen_map.is_empty() && arguments.layout.only_pens.is_none();
-    let mut by_color = Vec::new();
+    let mut parts = Vec::new();
     for (input, format) in inputs.0.iter().zip(&formats) {
         let mut loaded = load(input, arguments, &options.for_format(format, &formats))?;
-        let mut page = loaded.document.pages.swap_remove(loaded.page);
-        by_color.push(are_free && *format == "SVG" && is_numbered_by_color(&page));
-        layout.apply_pens(&mut page);
-        pages.push(page);
+        let page = loaded.document.pages.swap_remove(loaded.page);
+        parts.push(layout::Part { page, length: input.bytes.len(), format });
     }
-    layout::number_colors_together(&mut pages, &by_color);
-    let pages = pages.into_iter().zip(&inputs.0).map(|(page, input)| (page, input.bytes.len())).collect();
     let is_one = formats.iter().all(|format| *format == formats[0]);
     let format = if is_one { formats[0] } else { "several formats" };
-    let (mut page, conflicts) = layout::overlay(pages);
+    let (page, conflicts) = layout::compose(parts, &layout);
     for ColorConflict { pen, kept, lost, page } in conflicts {
         let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
         let what = format!(
@@ -229,19 +222,9 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
         );
         terminal::warning(Code::PenColors, &what);
     }
-    layout.apply_copies(&mut page.drawing);
     let size = format!("{} files", inputs.0.len());
     let document = Document { format, pages: vec![page], diagnostics: Vec::new(), size, facts: Vec::new() };
     Ok(LoadedDrawing { document, page: 0 })
-}
-
-/// Whether an SVG's pens are numbered by colour: it has at most one layer, and that has no number.
-fn is_numbered_by_color(page: &Page) -> bool {
-    let mut names = page.pens.values().filter_map(|pen| pen.name.as_deref());
-    let Some(first) = names.next() else { return true };
-    let text = first.trim_start_matches(['!', ' ']).to_ascii_lowercase();
-    let has_number = text.starts_with("pen") || text.starts_with(|first: char| first.is_ascii_digit());
-    !has_number && names.all(|name| name == first)
 }
 
 /// Reads one file as it is, and prints its diagnostics.

@@ -50,7 +50,7 @@ export class Compiler {
     this.module = module;
     this.progress = progress;
     this.count = 0;
-    /** @type {{id: number, name: string, bytes: Uint8Array} | null} */
+    /** @type {{id: number, files: {name: string, bytes: Uint8Array}[]} | null} */
     this.file = null;
     /** @type {Request | null} */
     this.working = null;
@@ -72,9 +72,9 @@ export class Compiler {
     return new Hand(this.module, (hand, data) => this.heard(hand, data));
   }
 
-  /** Opens a drawing's file for the requests that follow. @param {string} name @param {Uint8Array} bytes */
-  open(name, bytes) {
-    this.file = { id: ++this.count, name, bytes };
+  /** Opens a drawing's files for the requests that follow; several lie over each other. @param {{name: string, bytes: Uint8Array}[]} files */
+  open(files) {
+    this.file = { id: ++this.count, files };
   }
 
   /**

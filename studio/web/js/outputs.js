@@ -12,7 +12,7 @@ function save(bytes, name) {
 }
 
 /** A word as a shell takes it. @param {string} word */
-function quoted(word) {
+export function quoted(word) {
   return /^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 

@@ -18,10 +18,20 @@ function rounded(value, digits) {
   return Number(value.toFixed(digits));
 }
 
+/** What the search for the best place found. @param {any} found */
+function bestText({ duration_s, centered_duration_s, quantization_error_mm, centered_quantization_error_mm, compared }) {
+  const [figure, middle, unit] = duration_s === null ? [quantization_error_mm, centered_quantization_error_mm, "mm"] : [duration_s, centered_duration_s, "s"];
+  const digits = unit === "mm" ? 3 : 2;
+  const of = middle === null ? "in the middle of the sheet it cannot be drawn" : `${middle.toFixed(digits)} ${unit} in the middle of the sheet`;
+  return `${figure.toFixed(digits)} ${unit}; ${of}. ${compared} places were compared.`;
+}
+
 export class Placer {
   /** @param {import("./studio.js").Studio} studio */
   constructor(studio) {
     this.studio = studio;
+    /** What the search for the best place found. @type {any} */
+    this.found = null;
     /** @type {Affine | null} the last plan's */
     this.placement = null;
     /** @type {number[][]} */
@@ -33,6 +43,8 @@ export class Placer {
     press("place-fit", () => this.choose({ fit: true }));
     press("place-center", () => this.choose({ align: "center" }));
     press("place-origin", () => this.choose({}, true));
+    press("place-time", () => this.best("time"));
+    press("place-accuracy", () => this.best("accuracy"));
     press("by-hand", () => (this.isOn ? this.end() : this.begin()));
     for (const id of ["x", "y", "scale", "rotate"]) {
       const field = this.field(id);
@@ -63,9 +75,16 @@ export class Placer {
 
   /** Fit, centre, or the file's own place. @param {{fit?: boolean, align?: string}} how @param {boolean} isOwnSize */
   choose({ fit = false, align = "" }, isOwnSize = false) {
-    Object.assign(this.options, { fit, align, place: "" });
+    Object.assign(this.options, { fit, align, place: "", for: "" });
     if (fit || isOwnSize) this.options.scale = "";
     if (isOwnSize) Object.assign(this.options, { rotate: "", mirror: "" });
+    this.studio.changed(false);
+  }
+
+  /** Searches for the best place, and turn. @param {string} aim */
+  best(aim) {
+    Object.assign(this.options, { fit: false, align: "", place: "best", for: aim === "time" ? "" : aim, rotate: "" });
+    this.studio.showFields();
     this.studio.changed(false);
   }
 
@@ -94,6 +113,7 @@ export class Placer {
   }
 
   get degrees() {
+    if (this.options.place === "best") return this.found?.rotate_deg ?? 0;
     return Number(this.options.rotate) || 0;
   }
 
@@ -124,6 +144,7 @@ export class Placer {
       fit: false,
       align: "",
       place: `${x}mm,${y}mm`,
+      for: "",
       scale: scale === 1 ? "" : String(scale),
       rotate: degrees === 0 ? "" : String(degrees),
     });
@@ -153,14 +174,18 @@ export class Placer {
     this.placement = json.placement ?? null;
     this.beyond = json.beyond_mm ?? [];
     this.beyondSheet = json.beyond_sheet_mm ?? 0;
+    if (!isDraft) this.found = json.best_place ?? null;
     if (!isDraft || !this.drag) this.showPlace();
     this.studio.viewer.tool = this.isOn ? this.tool : this.studio.sketch.isOn ? this.studio.sketch.tool : this.beyond.length > 0 ? this.idle : null;
   }
 
   /** Shows the last plan's place. */
   showPlace() {
-    const { fit, align, place } = this.options;
-    const pressed = { "place-fit": fit, "place-center": align === "center", "place-origin": !fit && align === "" && place === "" };
+    const { fit, align, place, for: aim } = this.options;
+    const pressed = {
+      "place-fit": fit, "place-center": align === "center", "place-origin": !fit && align === "" && place === "",
+      "place-time": place === "best" && aim !== "accuracy", "place-accuracy": place === "best" && aim === "accuracy",
+    };
     for (const [id, on] of Object.entries(pressed)) byId(id).setAttribute("aria-pressed", String(on));
     /** @type {HTMLButtonElement} */ (byId("by-hand")).disabled = !this.place;
     if (this.place) this.showFields(this.place);
@@ -168,7 +193,7 @@ export class Placer {
     if (document.activeElement !== this.field("rotate")) this.field("rotate").value = String(this.degrees);
     if (document.activeElement !== this.field("margin")) this.field("margin").value = this.options.margin.replace(/mm$/, "");
     /** @type {HTMLSelectElement} */ (byId("mirror")).value = this.options.mirror;
-    byId("place-state").textContent = this.beyondSheet > 1e-6 ? `Ink reaches ${this.beyondSheet?.toFixed(2)} mm beyond the sheet; the machine can draw there.` : "";
+    byId("place-state").textContent = place === "best" && this.found ? bestText(this.found) : this.beyondSheet > 1e-6 ? `Ink reaches ${this.beyondSheet?.toFixed(2)} mm beyond the sheet; the machine can draw there.` : "";
   }
 
   /** @param {Place} place */

@@ -1,11 +1,14 @@
 // Sketching on the sheet with mouse, finger or pen. The sketch is an SVG drawing of the sheet's size.
 
 import { byId } from "../viewer/js/dom.js";
+import { corners, isLarge, mapped } from "./area.js";
 import { smooth } from "./smooth.js";
 import { toBase64 } from "./state.js";
 
 /** The pens: name and colour. @type {Record<number, [string, string]>} */
 const PENS = { 1: ["black", "#1c1c1c"], 2: ["red", "#c03028"], 3: ["green", "#1f7a3a"], 4: ["blue", "#2050a8"] };
+/** What the two corners of the area are on the sheet. */
+const AREA_FIELDS = ["area-x0", "area-y0", "area-x1", "area-y1"];
 /** The drawing's file. */
 const NAME = "sketch.svg";
 
@@ -53,6 +56,25 @@ export class Sketch {
     this.undone = [];
     /** @type {Stroke | null} */
     this.current = null;
+    /** The current stroke as the pointer goes, CSS pixels of the picture; with an area it is elsewhere on the sheet. @type {number[]} */
+    this.trace = [];
+    /** Corners of the area that were pressed, CSS pixels; null outside the calibration. @type {number[] | null} */
+    this.pressed = null;
+    byId("area-begin").addEventListener("click", () => {
+      this.pressed = this.pressed ? null : [];
+      this.show();
+    });
+    byId("area-end").addEventListener("click", () => this.setArea(null));
+    AREA_FIELDS.forEach((id, k) => {
+      const field = /** @type {HTMLInputElement} */ (byId(id));
+      field.addEventListener("change", () => {
+        const { area } = this.studio.state;
+        if (!area || field.value === "") return;
+        const sheet = [...area.sheet];
+        sheet[k] = Number(field.value);
+        this.setArea({ ...area, sheet });
+      });
+    });
     byId("sketch").addEventListener("click", () => (this.isOn ? this.pause() : this.begin(this.studio.state.sketch ?? [])));
     byId("undo").addEventListener("click", () => this.undo());
     byId("redo").addEventListener("click", () => this.redo());
@@ -86,7 +108,7 @@ export class Sketch {
     this.strokes = isPlaced ? strokes.map((stroke) => this.moved(stroke, placement)) : strokes;
     this.undone = [];
     // In its own place on the sheet, so that ink appears under the pointer.
-    Object.assign(this.studio.state.options, { fit: false, align: "", place: "", scale: "", rotate: "", mirror: "", page: "", pens: "" });
+    Object.assign(this.studio.state.options, { fit: false, align: "", place: "", for: "", scale: "", rotate: "", mirror: "", page: "", pens: "", copies: "", only_pens: "" });
     this.studio.showFields();
     this.show();
     await this.changed();
@@ -103,7 +125,45 @@ export class Sketch {
   pause() {
     this.isOn = false;
     this.current = null;
+    this.pressed = null;
     this.show();
+  }
+
+  /** @param {import("./area.js").Area | null} area */
+  setArea(area) {
+    this.pressed = null;
+    this.studio.state.area = area;
+    this.studio.remember();
+    this.show();
+  }
+
+  /** A corner of the area was pressed. @param {[number, number]} corner CSS pixels */
+  press(corner) {
+    this.pressed?.push(...corner);
+    const { pressed } = this;
+    if (!pressed || pressed.length < 4) return this.show();
+    if (!isLarge(pressed)) {
+      this.pressed = pressed.slice(0, 2);
+      this.show();
+      byId("area-state").textContent = "The corners are too near to each other: press the opposite corner.";
+      return;
+    }
+    const [x0, y0, x1, y1] = this.studio.viewer.meta.machine.sheet_mm;
+    this.setArea({ pad: pressed, sheet: corners(pressed, x1 - x0, y1 - y0).map((mm) => Number(mm.toFixed(3))) });
+  }
+
+  /** Shows the area's fields and what is to be done. */
+  showArea() {
+    const { area } = this.studio.state;
+    byId("area-fields").hidden = !area;
+    byId("area-end").hidden = !area;
+    byId("area-begin").setAttribute("aria-pressed", String(this.pressed !== null));
+    AREA_FIELDS.forEach((id, k) => {
+      const field = /** @type {HTMLInputElement} */ (byId(id));
+      if (area && document.activeElement !== field) field.value = String(area.sheet[k]);
+    });
+    const asked = this.pressed && (this.pressed.length < 2 ? "Press one corner of the area you draw on." : "Press the opposite corner.");
+    byId("area-state").textContent = asked ?? (area ? "What you draw in the area is drawn between these two points of the sheet." : "");
   }
 
   /** Another drawing takes its place. */
@@ -124,6 +184,7 @@ export class Sketch {
     disable("undo", this.strokes.length === 0);
     disable("redo", this.undone.length === 0);
     disable("clear", this.strokes.length === 0);
+    this.showArea();
     viewer.draw();
   }
 
@@ -158,14 +219,24 @@ export class Sketch {
     const svg = svgOf(this.strokes, x1 - x0, y1 - y0, Number(studio.state.smooth) || 0);
     const bytes = new TextEncoder().encode(svg);
     studio.state.file = { name: NAME, base64: toBase64(bytes) };
-    studio.compiler.open(NAME, bytes);
+    studio.state.others = [];
+    studio.compiler.open([{ name: NAME, bytes }]);
     studio.isFresh = true;
     await studio.changed(false, true);
   }
 
-  /** A place on the sheet, mm from its lower-left corner. @param {[number, number]} at @returns {[number, number]} */
-  onSheet([x, y]) {
+  /** Where an event is in the picture, CSS pixels. @param {{clientX: number, clientY: number}} event @returns {[number, number]} */
+  inPicture({ clientX, clientY }) {
+    const box = this.studio.viewer.front.getBoundingClientRect();
+    return [clientX - box.left, clientY - box.top];
+  }
+
+  /** Where an event is on the sheet, mm from its lower-left corner. @param {{clientX: number, clientY: number}} event @returns {[number, number]} */
+  onSheet(event) {
+    const [px, py] = this.inPicture(event);
     const [x0, y0, x1, y1] = this.studio.viewer.meta.machine.sheet_mm;
+    const { area } = this.studio.state;
+    const [x, y] = area ? mapped(area, px, py).map((mm, k) => mm + [x0, y0][k]) : this.studio.viewer.place({ x: px, y: py });
     const inside = (/** @type {number} */ value, /** @type {number} */ most) => Number(Math.min(Math.max(value, 0), most).toFixed(3));
     return [inside(x - x0, x1 - x0), inside(y - y0, y1 - y0)];
   }
@@ -173,18 +244,23 @@ export class Sketch {
   /** @returns {import("../viewer/js/viewer.js").Tool} */
   get tool() {
     return {
-      down: (at, event) => {
+      down: (_, event) => {
         if (event.button !== 0) return false;
-        this.current = { pen: Number(/** @type {HTMLSelectElement} */ (byId("sketch-pen")).value), points: this.onSheet(at) };
+        if (this.pressed) {
+          this.press(this.inPicture(event));
+          return true;
+        }
+        this.current = { pen: Number(/** @type {HTMLSelectElement} */ (byId("sketch-pen")).value), points: this.onSheet(event) };
+        this.trace = this.inPicture(event);
         return true;
       },
       move: (_, event) => {
-        const box = this.studio.viewer.front.getBoundingClientRect();
+        if (!this.current) return;
         // Between two frames a pen reports many positions.
         const events = event.getCoalescedEvents?.() ?? [];
-        for (const { clientX, clientY } of events.length > 0 ? events : [event]) {
-          const at = this.studio.viewer.place({ x: clientX - box.left, y: clientY - box.top });
-          this.current?.points.push(...this.onSheet(at));
+        for (const one of events.length > 0 ? events : [event]) {
+          this.current.points.push(...this.onSheet(one));
+          this.trace.push(...this.inPicture(one));
         }
       },
       up: () => {
@@ -199,6 +275,7 @@ export class Sketch {
       key: () => false,
       draw: (context, picture) => {
         this.studio.placer.drawBeyond(context, picture);
+        this.drawArea(context, picture);
         if (!this.current) return;
         const { pen, points } = this.current;
         const [x0, y0] = picture.meta.machine.sheet_mm;
@@ -209,5 +286,36 @@ export class Sketch {
         context.stroke();
       },
     };
+  }
+
+  /** The area of the pad, its corners, and the pointer's way in it. @param {CanvasRenderingContext2D} context @param {import("../viewer/js/picture.js").Picture} picture */
+  drawArea(context, picture) {
+    const { viewer, state } = this.studio;
+    const at = (/** @type {number[]} */ four, /** @type {number} */ k) => viewer.place({ x: four[k], y: four[k + 1] });
+    const points = this.pressed ?? state.area?.pad ?? [];
+    context.strokeStyle = picture.theme.select;
+    context.lineWidth = picture.wide(0, 1.4);
+    if (points.length === 4) {
+      const [[x0, y0], [x1, y1]] = [at(points, 0), at(points, 2)];
+      context.setLineDash([6 / picture.scale, 4 / picture.scale]);
+      context.strokeRect(Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0), Math.abs(y1 - y0));
+      context.setLineDash([]);
+    }
+    const arm = 7 / picture.scale;
+    for (let k = 0; k + 1 < points.length; k += 2) {
+      const [x, y] = at(points, k);
+      context.beginPath();
+      context.moveTo(x - arm, y);
+      context.lineTo(x + arm, y);
+      context.moveTo(x, y - arm);
+      context.lineTo(x, y + arm);
+      context.stroke();
+    }
+    if (!this.current || !state.area) return;
+    context.globalAlpha = 0.5;
+    context.beginPath();
+    for (let k = 0; k < this.trace.length; k += 2) context.lineTo(...at(this.trace, k));
+    context.stroke();
+    context.globalAlpha = 1;
   }
 }

@@ -7,6 +7,7 @@ import { MachineEditor } from "./machinefile.js";
 import { Outputs } from "./outputs.js";
 import { Outline } from "./outline.js";
 import { Placer } from "./place.js";
+import { Sender } from "./send.js";
 import { Sketch } from "./sketch.js";
 import { forget, fromBase64, initial, remember, toBase64 } from "./state.js";
 
@@ -16,10 +17,13 @@ import { forget, fromBase64, initial, remember, toBase64 } from "./state.js";
 /** Fields whose text is an option, and its unit. @type {[string, keyof Options, string][]} */
 const FIELDS = [
   ["tolerance", "tolerance", "mm"], ["period", "period", "ms"], ["order", "order", ""], ["effort", "effort", ""],
-  ["speed", "speed", ""], ["rounding", "rounding", ""], ["page", "page", ""], ["pens", "pens", ""], ["hatch", "hatch", "mm"],
+  ["speed", "speed", ""], ["law", "law", ""], ["segment-time", "segment_time", "ms"], ["rounding", "rounding", ""],
+  ["page", "page", ""], ["pens", "pens", ""], ["hatch", "hatch", "mm"], ["gap", "gap", "mm"], ["paper", "paper", ""],
 ];
 /** Options of the drawing's reader: its outline changes with them. */
-const READING = ["page", "pens", "hatch"];
+const READING = ["page", "pens", "hatch", "gap", "copies", "only_pens"];
+/** Laws with a time for each segment. */
+const FIXED = ["linear", "sine", "quadratic"];
 
 export class Studio {
   /**
@@ -33,6 +37,8 @@ export class Studio {
     this.viewer = viewer;
     /** @type {Outline | null} */
     this.outline = null;
+    /** Whether the files that are opened next lie over those that are open. */
+    this.adds = false;
     this.notice = element("div", { class: "notice", role: "alert" });
     this.welcome = element("div", { class: "welcome" }, element("p", {}, "Drop an HPGL, SVG or points file here, open one, or sketch on the sheet."));
     viewer.stage.append(this.welcome, this.notice);
@@ -44,12 +50,18 @@ export class Studio {
     this.placer = new Placer(this);
     this.sketch = new Sketch(this);
     this.outputs = new Outputs(this);
+    this.sender = new Sender(this);
     this.listen();
   }
 
   /** The job as the compiler takes it. @param {boolean} isDraft */
   job(isDraft = false) {
-    return { machine: this.state.machine, options: this.state.options, draft: isDraft };
+    const { machine, options } = this.state;
+    // A search takes hundreds of plans: drafts stay where the last one led.
+    const { found } = this.placer;
+    const isKept = isDraft && options.place === "best" && found;
+    const kept = isKept ? { ...options, place: `${found.place_mm[0]}mm,${found.place_mm[1]}mm`, rotate: String(found.rotate_deg) } : options;
+    return { machine, options: kept, draft: isDraft };
   }
 
   get hasDrawing() {
@@ -62,21 +74,27 @@ export class Studio {
     this.showFields();
     this.editor.show();
     this.openTab(state.tab);
-    if (state.file) await this.open(state.file.name, fromBase64(state.file.base64), state.sketch);
+    const files = [state.file, ...state.others].flatMap((file) => (file ? [{ name: file.name, bytes: fromBase64(file.base64) }] : []));
+    if (files.length > 0) await this.open(files, state.sketch);
     else await this.plan(false);
   }
 
   listen() {
     const file = /** @type {HTMLInputElement} */ (byId("file"));
-    byId("open").addEventListener("click", () => file.click());
+    for (const [id, adds] of /** @type {[string, boolean][]} */ ([["open", false], ["add", true]])) {
+      byId(id).addEventListener("click", () => {
+        this.adds = adds;
+        file.click();
+      });
+    }
     file.addEventListener("change", async () => {
-      const [chosen] = file.files ?? [];
+      const chosen = [...(file.files ?? [])];
       file.value = "";
-      if (chosen) await this.openFile(chosen);
+      await this.openFiles(chosen, this.adds);
     });
     byId("example").addEventListener("click", async () => {
       const response = await fetch(new URL("../examples/house.hpgl", import.meta.url));
-      await this.open("house.hpgl", new Uint8Array(await response.arrayBuffer()));
+      await this.open([{ name: "house.hpgl", bytes: new Uint8Array(await response.arrayBuffer()) }]);
     });
     byId("reset").addEventListener("click", () => {
       forget();
@@ -93,6 +111,7 @@ export class Studio {
       const changed = (/** @type {boolean} */ isDraft) => {
         const text = field.value.trim();
         Object.assign(this.state.options, { [option]: text === "" ? "" : `${text}${unit}` });
+        this.showDependent();
         this.changed(isDraft, READING.includes(option));
       };
       if (field.tagName === "INPUT") field.addEventListener("input", () => changed(true));
@@ -103,7 +122,22 @@ export class Studio {
       this.state.options.outline_fills = fills.checked;
       this.changed(false, true);
     });
+    for (const id of ["columns", "rows"]) {
+      byId(id).addEventListener("change", () => {
+        const [columns, rows] = ["columns", "rows"].map((id) => Math.max(1, Math.round(Number(/** @type {HTMLInputElement} */ (byId(id)).value) || 1)));
+        this.state.options.copies = columns * rows === 1 ? "" : `${columns}x${rows}`;
+        this.showDependent();
+        this.changed(false, true);
+      });
+    }
     this.listenToDrops();
+  }
+
+  /** Fields that belong to what is chosen in others. */
+  showDependent() {
+    const { options } = this.state;
+    byId("segment-time-field").hidden = !FIXED.includes(options.law);
+    byId("gap-field").hidden = options.copies === "";
   }
 
   listenToDrops() {
@@ -118,31 +152,36 @@ export class Studio {
     });
     document.addEventListener("drop", async (event) => {
       document.body.classList.remove("dropping");
-      const [dropped] = event.dataTransfer?.files ?? [];
-      if (!dropped) return;
+      const dropped = [...(event.dataTransfer?.files ?? [])];
+      if (dropped.length === 0) return;
       event.preventDefault();
-      await this.openFile(dropped);
+      await this.openFiles(dropped, false);
     });
   }
 
-  /** A machine file or a drawing. @param {File} file */
-  async openFile(file) {
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    if (file.name.endsWith(".toml")) this.editor.open(file.name.slice(0, -5), new TextDecoder().decode(bytes));
-    else await this.open(file.name, bytes);
+  /** Machine files and drawings; several drawings lie over each other. @param {File[]} files @param {boolean} adds */
+  async openFiles(files, adds) {
+    const opened = await Promise.all(files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));
+    for (const { name, bytes } of opened) {
+      if (name.endsWith(".toml")) this.editor.open(name.slice(0, -5), new TextDecoder().decode(bytes));
+    }
+    const drawings = opened.filter(({ name }) => !name.endsWith(".toml"));
+    const before = adds && this.compiler.file ? this.compiler.file.files : [];
+    if (drawings.length > 0) await this.open([...before, ...drawings]);
   }
 
   /**
-   * Opens a drawing and plans it.
-   * @param {string} name @param {Uint8Array} bytes @param {import("./state.js").Stroke[] | null} sketch  if it is one
+   * Opens a drawing of one file or several, and plans it.
+   * @param {{name: string, bytes: Uint8Array}[]} files @param {import("./state.js").Stroke[] | null} sketch  if it is one
    */
-  async open(name, bytes, sketch = null) {
+  async open(files, sketch = null) {
     this.sketch.end();
     this.placer.end();
     this.state.sketch = sketch;
-    if (name !== this.state.file?.name) this.state.options.page = "";
-    this.state.file = { name, base64: toBase64(bytes) };
-    this.compiler.open(name, bytes);
+    if (files[0].name !== this.state.file?.name) Object.assign(this.state.options, { page: "", only_pens: "" });
+    const [file, ...others] = files.map(({ name, bytes }) => ({ name, base64: toBase64(bytes) }));
+    Object.assign(this.state, { file, others });
+    this.compiler.open(files);
     this.isFresh = true;
     await this.changed(false, true);
   }
@@ -191,9 +230,11 @@ export class Studio {
       this.isFresh = false;
     }
     if (json.problems.length > 0) this.showStale();
+    else if (isDraft) this.showVerdict("Draft");
     this.placer.planned(json, isDraft);
     if (!isDraft) {
       this.outputs.show();
+      this.sender.show();
       document.title = `${json.meta.title} - plotplan studio`;
       document.documentElement.dataset.planned = String(Number(document.documentElement.dataset.planned ?? 0) + 1);
     }
@@ -201,11 +242,16 @@ export class Studio {
 
   /** The picture is that of the last plan, not of what the page asks for now. */
   showStale() {
+    this.showVerdict("Not planned");
+    byId("verdict").classList.add("bad");
+  }
+
+  /** @param {string} text */
+  showVerdict(text) {
     const verdict = byId("verdict");
     verdict.hidden = false;
-    verdict.textContent = "Not planned";
-    verdict.classList.remove("good");
-    verdict.classList.add("bad");
+    verdict.textContent = text;
+    verdict.classList.remove("good", "bad");
   }
 
   async readDrawing() {
@@ -231,10 +277,30 @@ export class Studio {
     if (this.isRemembered === false) parts.push(element("p", { class: "soft" }, "This drawing is too large to be remembered: it is gone when the page is closed."));
     byId("facts").replaceChildren(...parts);
     byId("svg-fields").hidden = report.format !== "SVG" || this.sketch.isOn;
+    byId("add").hidden = this.sketch.isOn;
+    this.showPens(found.pens);
     byId("page-field").hidden = pages < 2;
     const select = /** @type {HTMLSelectElement} */ (byId("page"));
     select.replaceChildren(...Array.from({ length: pages }, (_, k) => element("option", { value: k === 0 ? "" : String(k + 1) }, `${k + 1} of ${pages}`)));
     select.value = this.state.options.page;
+  }
+
+  /** The pens of the files, each to be drawn or left out. @param {number[]} pens */
+  showPens(pens) {
+    const chosen = () => this.state.options.only_pens.split(",").filter((pen) => pen !== "").map(Number);
+    byId("pens-field").hidden = pens.length < 2;
+    byId("only-pens").replaceChildren(...pens.map((pen) => {
+      const box = /** @type {HTMLInputElement} */ (element("input", { type: "checkbox" }));
+      box.checked = chosen().length === 0 || chosen().includes(pen);
+      box.addEventListener("change", () => {
+        const before = chosen().length === 0 ? pens : chosen();
+        const now = pens.filter((other) => (other === pen ? box.checked : before.includes(other)));
+        if (now.length === 0) return void (box.checked = true);
+        this.state.options.only_pens = now.length === pens.length ? "" : now.join(",");
+        this.changed(false, true);
+      });
+      return element("label", { class: "check" }, box, ` ${pen}`);
+    }));
   }
 
   /** Shows the options in their fields. */
@@ -245,13 +311,17 @@ export class Studio {
     }
     /** @type {HTMLInputElement} */ (byId("outline-fills")).checked = this.state.options.outline_fills;
     /** @type {HTMLInputElement} */ (byId("smooth")).value = this.state.smooth;
+    const [columns = "", rows = ""] = this.state.options.copies.split("x");
+    /** @type {HTMLInputElement} */ (byId("columns")).value = columns;
+    /** @type {HTMLInputElement} */ (byId("rows")).value = rows;
+    this.showDependent();
   }
 
   /** Each problem at its place: the machine's at its line, the others over the picture. @param {Problem[]} problems */
   showProblems(problems = []) {
     this.editor.showProblems(problems.filter((problem) => problem.about === "machine"));
     const wrong = new Set(problems.map((problem) => problem.option));
-    for (const [id, option] of FIELDS) byId(id).setAttribute("aria-invalid", String(wrong.has(option)));
+    for (const [id, option] of FIELDS) byId(id).setAttribute("aria-invalid", String(wrong.has(option.replaceAll("_", "-"))));
     const items = problems.map((problem) => {
       const where = problem.about === "machine" ? `Machine file${problem.line ? `, line ${problem.line}` : ""}: ` : "";
       const box = element("div", { class: "problem" }, element("b", {}, `${where}${problem.message}`));

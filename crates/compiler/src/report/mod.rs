@@ -32,7 +32,7 @@ pub use self::machine::{
     ListedMachine, MachineMotor, MachineReport, MachineSource, SheetReport, WorkspaceReport,
 };
 pub use self::sending::{SendEnd, SendReport, SendUnit};
-pub use self::summary::{Ordering, Summary};
+pub use self::summary::{BestPlaceReport, Ordering, Summary};
 
 use crate::import::Diagnostic;
 use crate::pipeline::Arranged;

@@ -1,7 +1,7 @@
 //! Values of options as text: lengths, angles, places, pens.
 
 use compiler::layout::Crop;
-pub(super) use compiler::option::{align, angle, hatch, length, scale, time};
+pub(super) use compiler::option::{align, angle, grid, hatch, length, scale, time};
 
 use super::{PageChoice, Place};
 
@@ -43,13 +43,6 @@ pub(super) fn pen_pair(text: &str) -> Result<(u16, u16), String> {
     let (from, to) = text.split_once('=').ok_or(what)?;
     let pen = |text: &str| text.trim().parse::<u16>().ok().filter(|pen| *pen > 0).ok_or(what);
     Ok((pen(from)?, pen(to)?))
-}
-
-pub(super) fn grid(text: &str) -> Result<(u16, u16), String> {
-    let what = "expected columns and rows such as 3x2, from 1 to 1000";
-    let (columns, rows) = text.split_once('x').ok_or(what)?;
-    let count = |text: &str| text.trim().parse::<u16>().ok().filter(|n| (1..=1000).contains(n)).ok_or(what);
-    Ok((count(columns)?, count(rows)?))
 }
 
 pub(super) fn crop(text: &str) -> Result<Crop, String> {
