@@ -7,8 +7,8 @@ use std::fmt;
 
 use backends::homing::HomingRun;
 use backends::{
-    Backend, EncodeOptions, Outcome, PlanSource, PositionQuery, Program, ReportedPosition, RowIter, Session,
-    SessionOptions, Waiting,
+    Backend, EncodeOptions, Outcome, PlanSource, PositionQuery, Program, Progress, ReportedPosition, RowIter,
+    Session, SessionOptions, Waiting,
 };
 use kinematics::{HomingMethod, Machine};
 use serde::{Deserialize, Serialize};
@@ -145,6 +145,8 @@ struct End {
     text: String,
     /// The row to resume from.
     row: Option<u64>,
+    /// How far it came, if a session had begun.
+    progress: Option<Progress>,
 }
 
 /// A conversation with one machine.
@@ -238,7 +240,7 @@ impl Sending {
             program,
             from: job.from,
             reconnect_us: (job.reconnect_s * 1e6) as u64,
-            talk: Talk::Ended(End { phase: Phase::Failed, text: String::new(), row: None }),
+            talk: Talk::Ended(End { phase: Phase::Failed, text: String::new(), row: None, progress: None }),
             is_pausing: false,
             has_heard: false,
             stopped_us: None,
@@ -429,7 +431,8 @@ impl Sending {
     }
 
     fn end(&mut self, phase: Phase, text: String, row: Option<u64>) {
-        self.talk = Talk::Ended(End { phase, text, row });
+        let progress = if let Talk::Session(session) = &self.talk { Some(session.progress()) } else { None };
+        self.talk = Talk::Ended(End { phase, text, row, progress });
     }
 
     /// Ends in the middle, with what is known of the row.
@@ -524,8 +527,12 @@ impl Sending {
             },
         };
         let row = if let Talk::Ended(end) = &self.talk { end.row } else { None };
-        let progress = session.map(|session| {
-            let progress = session.progress();
+        let progress = match &self.talk {
+            Talk::Session(session) => Some(session.progress()),
+            Talk::Ended(end) => end.progress,
+            _ => None,
+        };
+        let progress = progress.map(|progress| {
             json!({
                 "lines": progress.lines,
                 "of_lines": progress.of_lines,
@@ -566,9 +573,9 @@ mod tests {
     fn file(protocol: &ProtocolInfo) -> (MachineChoice, Vec<u8>) {
         let mut studio = Studio::default();
         studio.open("a.hpgl", b"IN;SP1;PU400,400;PD1200,400,1200,800;PU;PU400,800;PD600,900;PU;");
-        let presets = compiler::machine_file::PRESETS.iter();
+        let mut presets = compiler::machine_file::PRESETS.iter();
         presets
-            .filter_map(|preset| {
+            .find_map(|preset| {
                 let machine = MachineChoice { name: preset.name.to_owned(), toml: String::new() };
                 // A plotter's paper is smaller than the sheets of most machines.
                 let options = Options { fit: protocol.format != "hpgl", ..Options::default() };
@@ -577,7 +584,6 @@ mod tests {
                 let job = send_job(protocol.name, &machine);
                 Sending::new(&job, &bytes).ok().map(|_| (machine, bytes))
             })
-            .next()
             .unwrap_or_else(|| panic!("no machine for {}", protocol.name))
     }
 

@@ -6,7 +6,7 @@ use compiler::import::{self, Document, Page};
 use compiler::layout::{self, Part};
 use compiler::machine_file::MachineFile;
 use compiler::pipeline::{self, Request, Step};
-use compiler::report::{CertificateReport, DrawingReport, Finding, Summary};
+use compiler::report::{CertificateReport, Code, DrawingReport, Finding, Summary};
 use compiler::scene;
 use compiler::view::{DrawingView, SourceFile, View, description};
 use drawing::{Affine, Drawing, Span};
@@ -37,6 +37,8 @@ pub struct Studio {
     files: Vec<File>,
     /// The files as they were read with these options.
     read: Option<(import::Options, Vec<Document>)>,
+    /// What the program warns of besides: of each file, and of all.
+    warnings: (Vec<Option<Finding>>, Vec<Finding>),
     /// The last plan that was no draft.
     planned: Option<Planned>,
     /// The conversation with a machine, and the emulated machine at the other end of a rehearsal.
@@ -144,30 +146,32 @@ impl Studio {
         self.read(job)?;
         let documents = self.read.as_ref().map_or(&[][..], |(_, documents)| documents);
         let mut parts = Vec::new();
+        let mut warnings = Vec::new();
         for (file, document) in self.files.iter().zip(documents) {
+            let File { name, bytes } = file;
             let pages = &document.pages;
-            let page = pages.get(number - 1).cloned().ok_or_else(|| Problem {
-                option: Some("page"),
-                ..Problem::new(
-                    About::Option,
-                    format!("{} has {} pages, not page {number}", file.name, pages.len()),
-                )
-            })?;
-            parts.push(Part { page, length: file.bytes.len(), format: document.format });
+            let wrong = |option, what| Problem { option: Some(option), ..Problem::new(About::Option, what) };
+            let what = || format!("{name} has {} pages, not page {number}", pages.len());
+            let page = pages.get(number - 1).cloned().ok_or_else(|| wrong("page", what()))?;
+            let missing = layout.check_pens(name, &layout::pens_of(pages));
+            let missing = missing.map_err(|what| wrong("only-pens", what))?;
+            warnings.push(missing.map(|what| Finding::warning(Code::PenMissing, &what)));
+            parts.push(Part { page, length: bytes.len(), format: document.format });
         }
-        let pens: BTreeSet<u16> =
-            parts.iter().flat_map(|part| part.page.drawing.pens()).map(|pen| pen.0).collect();
-        let (page, _) = layout::compose(parts, &layout);
-        if page.drawing.is_empty() && !pens.is_empty() {
-            let pens: Vec<String> = pens.iter().map(u16::to_string).collect();
-            let what = format!(
-                "--only-pens {} leaves nothing: {} draws with pens {}",
-                job.options.only_pens,
-                self.name(),
-                pens.join(", ")
-            );
-            return Err(Problem { option: Some("only-pens"), ..Problem::new(About::Option, what) }.into());
+        let (page, conflicts) = layout::compose(parts, &layout);
+        let more = conflicts.iter().map(|conflict| {
+            Finding::warning(Code::PenColors, &conflict.text(&self.files[conflict.page].name))
+        });
+        let mut others: Vec<Finding> = more.collect();
+        if let [document] = documents {
+            let asked = (!job.options.page.trim().is_empty()).then_some(number);
+            let found = layout::several_pages(&self.name(), document.pages.len(), asked);
+            others.extend(found.map(|what| {
+                let severity = if asked.is_some() { "note" } else { "warning" };
+                Finding { severity: severity.to_owned(), ..Finding::warning(Code::SeveralPages, &what) }
+            }));
         }
+        self.warnings = (warnings, others);
         Ok((page, number))
     }
 
@@ -182,13 +186,17 @@ impl Studio {
         job
     }
 
-    /// What was found in the drawing's files.
+    /// What was found in the drawing's files, in the order of the program.
     fn findings(&self) -> Vec<Finding> {
         let documents = self.read.as_ref().map_or(&[][..], |(_, documents)| documents);
-        let of = |(file, document): (&File, &Document)| -> Vec<Finding> {
-            document.diagnostics.iter().map(|diagnostic| Finding::of(&file.name, diagnostic)).collect()
-        };
-        self.files.iter().zip(documents).flat_map(of).collect()
+        let (of_files, others) = &self.warnings;
+        let mut all = Vec::new();
+        for (index, (file, document)) in self.files.iter().zip(documents).enumerate() {
+            all.extend(document.diagnostics.iter().map(|diagnostic| Finding::of(&file.name, diagnostic)));
+            all.extend(of_files.get(index).cloned().flatten());
+        }
+        all.extend(others.iter().cloned());
+        all
     }
 
     /// Stops where the drawing lacks something or draws nothing, as the program does.

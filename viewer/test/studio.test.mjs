@@ -496,7 +496,7 @@ async function sentByProgram(protocol, plan, machine) {
   try {
     // It prints the name of its port when that is there.
     await new Promise((done) => emulator.stdout.once("data", done));
-    execFileSync(PROGRAM, ["send", file, "--port", link, "--protocol", protocol, "--log", log, "--quiet"]);
+    execFileSync(PROGRAM, ["send", file, "--port", link, "--protocol", protocol, "--log", log, "--quiet"], { input: "\n\n" });
     const lines = fs.readFileSync(log, "utf8").split("\n").map((line) => /^[0-9.]+ > (.*)$/.exec(line)).filter((found) => found);
     return unescaped(lines.map((found) => found[1]).join(""));
   } finally {
@@ -553,8 +553,17 @@ test("sends over a serial port what the program sends", () => onStudio({}, async
     await page.selectOption("#send-to", "port");
     await page.selectOption("#protocol", protocol);
     await page.fill("#baud", "250000");
-    assert.equal(await sent(page), "done", await page.locator("#send-state").textContent());
+    // The machine that is driven by G-code has no pen numbers: it pauses for the operator.
+    const changes = protocol === "gcode" ? [1, 2] : [];
+    const ended = await sent(page, async () => {
+      for (const pen of changes) {
+        await says(page, `put in pen ${pen}`);
+        await page.click("#pause");
+      }
+    });
+    assert.equal(ended, "done", await page.locator("#send-state").textContent());
     assert.match(await page.locator("#send-state").textContent(), /^Sent \d+ lines/);
+    assert.match(await page.locator("#send-progress").textContent(), /^(\d+) of \1 lines/);
     assert.deepEqual(await page.evaluate(() => window.opened), { baudRate: 250000, flowControl: "none", bufferSize: 4096 });
     // Questions for the state come as time passes; the plan's own bytes are the same.
     const own = (text) => text.replaceAll("?", "").replace(/where\*\d+\n/g, "");

@@ -94,6 +94,27 @@ impl Layout {
         page.pens = pens;
     }
 
+    /// Checks the pens that the layout names against those of the file called `name`: what to warn of.
+    ///
+    /// # Errors
+    /// A choice of pens that leaves nothing.
+    pub fn check_pens(&self, name: &str, pens: &BTreeSet<u16>) -> Result<Option<String>, String> {
+        if pens.is_empty() {
+            return Ok(None);
+        }
+        let list = |pens: &[u16]| pens.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
+        let have = || format!("{name} draws with pens {}", list(&pens.iter().copied().collect::<Vec<_>>()));
+        let only = self.only_pens.as_deref().unwrap_or_default();
+        if !only.is_empty() && !only.iter().any(|pen| pens.contains(pen)) {
+            return Err(format!("--only-pens {} leaves nothing: {}", list(only), have()));
+        }
+        let mapped = self.pen_map.iter().map(|(from, _)| *from);
+        let missing: BTreeSet<u16> =
+            only.iter().copied().chain(mapped).filter(|pen| !pens.contains(pen)).collect();
+        let missing: Vec<u16> = missing.into_iter().collect();
+        Ok((!missing.is_empty()).then(|| format!("no stroke has pen {}: {}", list(&missing), have())))
+    }
+
     /// The number that a pen of the file gets.
     pub fn mapped(&self, pen: Pen) -> Pen {
         let found = self.pen_map.iter().find(|(from, _)| *from == pen.0);
@@ -142,6 +163,29 @@ pub struct ColorConflict {
     pub lost: [u8; 3],
     /// Index of this drawing.
     pub page: usize,
+}
+
+impl ColorConflict {
+    /// The warning, with the name of this drawing's file.
+    pub fn text(&self, name: &str) -> String {
+        let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
+        let (pen, lost, kept) = (self.pen.0, hex(self.lost), hex(self.kept));
+        format!("pen {pen} is {lost} in {name} but {kept} before: it keeps the first colour")
+    }
+}
+
+/// What to report where one of `pages` pages is taken: a warning if none was asked for, otherwise a note.
+pub fn several_pages(name: &str, pages: usize, asked: Option<usize>) -> Option<String> {
+    match (pages, asked) {
+        (0 | 1, _) => None,
+        (_, None) => Some(format!("{name} has {pages} pages; this is page 1, --page takes another")),
+        (_, Some(page)) => Some(format!("{name} has {pages} pages; this is page {page}")),
+    }
+}
+
+/// The numbers of the pens that a document's pages draw with.
+pub fn pens_of(pages: &[Page]) -> BTreeSet<u16> {
+    pages.iter().flat_map(|page| page.drawing.pens()).map(|pen| pen.0).collect()
 }
 
 /// Numbers the pens of pages that are numbered by colour (`by_color`, one for each page) so that a

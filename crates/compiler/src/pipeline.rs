@@ -402,12 +402,7 @@ struct Planned<'a> {
 }
 
 /// The header of a plan's table.
-fn header_of(
-    trajectory: &Trajectory<'_>,
-    placement: Affine,
-    machine: &Machine,
-    request: &Request,
-) -> Header {
+fn header_of(trajectory: &Trajectory<'_>, placement: Affine, machine: &Machine, request: &Request) -> Header {
     Header {
         machine: machine.name().to_owned(),
         motors: header_motors(machine),
@@ -436,11 +431,7 @@ pub struct Draft<'a> {
 ///
 /// # Errors
 /// As [`compile`].
-pub fn draft<'a>(
-    drawing: &Drawing,
-    machine: &'a Machine,
-    request: &Request,
-) -> Result<Draft<'a>, PlanError> {
+pub fn draft<'a>(drawing: &Drawing, machine: &'a Machine, request: &Request) -> Result<Draft<'a>, PlanError> {
     let Placed { placement, drawing: placed, beyond_sheet_mm } =
         place(drawing, machine, &request.placement, request.crop)?;
     let trajectory = plan(machine, placed, &planner_settings(request), &|_| {})?;

@@ -1,13 +1,13 @@
 //! Input files and standard input, and drawings read from them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::Context as _;
 use compiler::import::{self, Document, ImportError, Page, Severity};
-use compiler::layout::{self, ColorConflict, Crop};
+use compiler::layout::{self, Crop};
 use compiler::pipeline::Target;
 use compiler::report::{Code, ErrorReport, Place, text};
 use drawing::{Drawing, Span};
@@ -211,16 +211,8 @@ pub(crate) fn drawings(inputs: &Inputs, arguments: &cli::Reading) -> Result<Load
     let is_one = formats.iter().all(|format| *format == formats[0]);
     let format = if is_one { formats[0] } else { "several formats" };
     let (page, conflicts) = layout::compose(parts, &layout);
-    for ColorConflict { pen, kept, lost, page } in conflicts {
-        let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
-        let what = format!(
-            "pen {} is {} in {} but {} before: it keeps the first colour",
-            pen.0,
-            hex(lost),
-            inputs.0[page].path,
-            hex(kept)
-        );
-        terminal::warning(Code::PenColors, &what);
+    for conflict in conflicts {
+        terminal::warning(Code::PenColors, &conflict.text(&inputs.0[conflict.page].path));
     }
     let size = format!("{} files", inputs.0.len());
     let document = Document { format, pages: vec![page], diagnostics: Vec::new(), size, facts: Vec::new() };
@@ -303,17 +295,16 @@ pub(crate) fn use_page(
 ) -> Result<(), Failure> {
     refuse_unusable(&inputs.path(), &drawn.document)?;
     let pages = drawn.document.pages.len();
-    match arguments.page {
-        _ if pages == 1 => {}
-        None => {
-            let what = format!("{} has {pages} pages; this is page 1, --page takes another", inputs.path());
-            terminal::warning(Code::SeveralPages, &what);
+    let asked = match arguments.page {
+        None => None,
+        Some(PageChoice::Number(page)) => Some(page),
+        Some(PageChoice::All) => return refuse_warnings(arguments.strict),
+    };
+    if let Some(what) = layout::several_pages(&inputs.path(), pages, asked) {
+        match asked {
+            None => terminal::warning(Code::SeveralPages, &what),
+            Some(_) => terminal::note(Code::SeveralPages, &what),
         }
-        Some(PageChoice::Number(page)) => {
-            let what = format!("{} has {pages} pages; this is page {page}", inputs.path());
-            terminal::note(Code::SeveralPages, &what);
-        }
-        Some(PageChoice::All) => {}
     }
     refuse_warnings(arguments.strict)
 }
@@ -321,25 +312,10 @@ pub(crate) fn use_page(
 /// Reports pens of `--only-pens` and `--pen-map` that the drawing does not have. Refuses a selection
 /// that leaves nothing.
 fn check_pens(input: &Input, document: &Document, arguments: &cli::Reading) -> Result<(), Failure> {
-    let pens: BTreeSet<u16> =
-        document.pages.iter().flat_map(|page| page.drawing.pens()).map(|pen| pen.0).collect();
-    if pens.is_empty() {
-        return Ok(());
-    }
-    let list = |pens: &[u16]| pens.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
-    let have =
-        || format!("{} draws with pens {}", input.path, list(&pens.iter().copied().collect::<Vec<_>>()));
-    let only = arguments.layout.only_pens.as_deref().unwrap_or_default();
-    if !only.is_empty() && !only.iter().any(|pen| pens.contains(pen)) {
-        let what = format!("--only-pens {} leaves nothing: {}", list(only), have());
-        return Err(Failure::Drawing(anyhow::anyhow!(what)));
-    }
-    let mapped = arguments.layout.pen_map.iter().map(|(from, _)| *from);
-    let missing: BTreeSet<u16> =
-        only.iter().copied().chain(mapped).filter(|pen| !pens.contains(pen)).collect();
-    if !missing.is_empty() {
-        let missing: Vec<u16> = missing.into_iter().collect();
-        terminal::warning(Code::PenMissing, &format!("no stroke has pen {}: {}", list(&missing), have()));
+    let pens = layout::pens_of(&document.pages);
+    let missing = arguments.layout.to_layout().check_pens(&input.path, &pens);
+    if let Some(what) = missing.map_err(|what| Failure::Drawing(anyhow::anyhow!(what)))? {
+        terminal::warning(Code::PenMissing, &what);
     }
     Ok(())
 }
