@@ -8,7 +8,7 @@ use compiler::machine_file::MachineFile;
 use compiler::pipeline::{self, Request, Step};
 use compiler::report::{CertificateReport, Code, DrawingReport, Finding, Summary};
 use compiler::scene;
-use compiler::view::{DrawingView, SourceFile, View, description};
+use compiler::view::{self, DrawingView, SourceFile, View, description};
 use drawing::{Affine, Drawing, Span};
 use kinematics::Machine;
 use plan::{Header, Row};
@@ -41,6 +41,8 @@ pub struct Studio {
     warnings: (Vec<Option<Finding>>, Vec<Finding>),
     /// The last plan that was no draft.
     planned: Option<Planned>,
+    /// What the viewer needs of the machine, whose outlines take longer than a draft: file, paper, description.
+    described: Option<(String, String, Value)>,
     /// The conversation with a machine, and the emulated machine at the other end of a rehearsal.
     pub(crate) sending: Option<Sending>,
     pub(crate) emulated: Option<Emulated>,
@@ -394,9 +396,21 @@ impl Studio {
         }
     }
 
+    /// What the viewer needs of the job's machine.
+    fn described(&mut self, job: &Job, machine: &Machine) -> Value {
+        let (text, paper) = (job.machine.text(), job.options.paper.as_str());
+        if let Some((_, _, found)) = self.described.as_ref().filter(|(t, p, _)| t == text && p == paper) {
+            return found.clone();
+        }
+        let found = view::machine(machine);
+        self.described = Some((text.to_owned(), paper.to_owned(), found.clone()));
+        found
+    }
+
     /// A draft for the viewer. It has no certificate; the bytes of each stroke and the distance of each row from
     /// the drawing come with the full plan.
-    fn draft(&self, job: &Job, page: &Page, machine: &Machine) -> Result<Reply, Problems> {
+    fn draft(&mut self, job: &Job, page: &Page, machine: &Machine) -> Result<Reply, Problems> {
+        let described = self.described(job, machine);
         let request = job.request(page, machine)?;
         let draft = pipeline::draft(&page.drawing, machine, &request)
             .map_err(|error| refusal(&page.drawing, machine, &request, &error))?;
@@ -416,7 +430,7 @@ impl Studio {
             findings: self.findings(),
             prediction: None,
         };
-        let (meta, columns) = view.data_into(Columns::quick());
+        let (meta, columns) = view.data_with(described, Columns::quick());
         let ink = placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
             "meta": meta,
@@ -429,8 +443,9 @@ impl Studio {
         Ok(Reply { json, columns: columns.bytes().to_vec() })
     }
 
-    fn view(&self, planned: &Planned) -> Reply {
-        let (meta, columns) = self.view_of(planned).data_into(Columns::quick());
+    fn view(&mut self, planned: &Planned) -> Reply {
+        let described = self.described(&planned.job, &planned.machine);
+        let (meta, columns) = self.view_of(planned).data_with(described, Columns::quick());
         let ink = planned.placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
             "meta": meta,

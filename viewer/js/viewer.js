@@ -37,6 +37,7 @@ export class Viewer {
     this.rate = 1;
     this.end = 0;
     this.isPlaying = false;
+    this.isDrawing = false;
     this.selected = -1;
     /** @type {Tool | null} What takes the pointer on the picture instead of moving it. */
     this.tool = null;
@@ -541,6 +542,7 @@ export class Viewer {
   draw() {
     if (this.requested) return;
     this.requested = true;
+    if (!this.isDrawing) this.showDrawing(true);
     requestAnimationFrame((now) => this.frame(now));
   }
 
@@ -573,5 +575,12 @@ export class Viewer {
       performance.mark("shown");
     }
     if (this.isPlaying || left) this.draw();
+    else if (!this.requested) this.showDrawing(false);
+  }
+
+  /** Whether frames are still to come, for tests and tools that take pictures. @param {boolean} is */
+  showDrawing(is) {
+    this.isDrawing = is;
+    this.stage.toggleAttribute("data-drawing", is);
   }
 }

@@ -121,14 +121,17 @@ export async function onStudio(options, check) {
   }
 }
 
-/** Waits until the page has drawn all that it had to: the studio's compiler is idle, frames and timers are done. */
+/** Waits until the page has drawn all that it had to: the studio's compiler and the viewer are idle. */
 export async function settled(page) {
+  // What was clicked reaches the compiler and the picture within these frames.
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => setTimeout(() => requestAnimationFrame(() => setTimeout(done, 40)), 40))));
   await page.waitForFunction(() => {
     const compiler = window.plotplanStudio?.compiler;
-    return !compiler || (!compiler.working && compiler.waiting.length === 0);
+    const isIdle = !compiler || (!compiler.working && compiler.waiting.length === 0);
+    return isIdle && document.documentElement.dataset.ready && !document.querySelector("#stage[data-drawing]");
   });
-  // A frame, the timers that it sets, and the frame that they lead to.
-  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => setTimeout(() => requestAnimationFrame(() => setTimeout(done, 30)), 30))));
+  // Diagrams take one more.
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 }
 
 /** Compares a picture of the page, at half its size, with its reference. */

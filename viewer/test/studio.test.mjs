@@ -430,6 +430,51 @@ test("axe-core finds nothing in the studio", async () => {
   }
 });
 
+test("the arm's pen stands on the ink", () => onStudio({}, async (page) => {
+  // Rows are rounded along the path here: exact positions are up to a millimetre away.
+  await planned(page, () => page.click("#example"));
+  const [most, off] = await page.evaluate(async () => {
+    const { motorsAt } = await import("/viewer/js/plan.js");
+    const { viewer } = window.plotplanStudio;
+    const { rows, picture, meta } = viewer;
+    const { pen } = meta.machine.linkage;
+    let [most, off] = [0, 0];
+    for (let row = 0; row < rows.t.length; row++) {
+      const points = picture.pose(...motorsAt(rows, rows.t[row]));
+      most = Math.max(most, Math.hypot(points[2 * pen] - rows.x[row], points[2 * pen + 1] - rows.y[row]));
+      const exact = picture.pose(rows.q[0][row], rows.q[1][row]);
+      off = Math.max(off, Math.hypot(exact[2 * pen] - rows.x[row], exact[2 * pen + 1] - rows.y[row]));
+    }
+    return [most, off];
+  });
+  assert.ok(most < 1e-3, `${most} mm`);
+  assert.ok(off > 0.1, "this drawing has rows off the exact positions");
+}));
+
+test("the scrubber's bands are readable on its ground, light and dark", async () => {
+  for (const scheme of ["light", "dark"]) {
+    await onStudio({ scheme }, async (page) => {
+      await planned(page, () => page.click("#example"));
+      const contrasts = await page.evaluate(() => {
+        const channels = (text) => {
+          const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
+          const context = canvas.getContext("2d");
+          context.fillStyle = text;
+          context.fillRect(0, 0, 1, 1);
+          return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
+        };
+        const luminance = (text) => channels(text).map((value) => value / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)).reduce((sum, c, k) => sum + c * [0.2126, 0.7152, 0.0722][k], 0);
+        const ground = luminance(getComputedStyle(document.getElementById("scrubber")).backgroundColor);
+        return [...window.plotplanStudio.viewer.picture.pens.values()].map(({ color }) => {
+          const ink = luminance(color);
+          return (Math.max(ink, ground) + 0.05) / (Math.min(ink, ground) + 0.05);
+        });
+      });
+      assert.ok(contrasts.length > 0 && Math.min(...contrasts) >= 3, `${scheme}: ${contrasts}`);
+    });
+  }
+});
+
 /** A small drawing of two pens: some seconds on an arm. */
 const SMALL = Buffer.from("IN;SP1;PU400,400;PD1200,400,1200,800;PU;SP2;PU400,800;PD600,900;PU;");
 

@@ -129,7 +129,12 @@ impl View<'_> {
     }
 
     /// The same, in these columns.
-    pub fn data_into(&self, mut columns: Columns) -> (Value, Columns) {
+    pub fn data_into(&self, columns: Columns) -> (Value, Columns) {
+        self.data_with(machine(self.machine), columns)
+    }
+
+    /// The same, with what [`machine`] said of this machine before.
+    pub fn data_with(&self, machine: Value, mut columns: Columns) -> (Value, Columns) {
         let units = self.rows_into(&mut columns);
         let traced = self
             .drawing
@@ -159,7 +164,7 @@ impl View<'_> {
             "program": concat!("plotplan ", env!("CARGO_PKG_VERSION")),
             "title": self.title,
             "subtitle": subtitle,
-            "machine": machine(self.machine),
+            "machine": machine,
             "period_us": self.header.period_us,
             "duration_us": self.header.duration_us,
             "exact": self.exact.is_some(),
@@ -338,7 +343,7 @@ fn prediction_into(prediction: &Prediction<'_>, units: [f64; 2], columns: &mut C
 }
 
 /// The machine as `js/machine.js` reads it.
-fn machine(machine: &Machine) -> Value {
+pub fn machine(machine: &Machine) -> Value {
     let sheet = machine.sheet();
     let mechanism = machine.mechanism();
     let reach: Vec<Vec<f64>> = reach_outlines(machine)
