@@ -430,7 +430,7 @@ impl Studio {
             findings: self.findings(),
             prediction: None,
         };
-        let (meta, columns) = view.data_with(described, Columns::quick());
+        let (meta, columns) = view.data_with(&described, Columns::quick());
         let ink = placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
             "meta": meta,
@@ -445,7 +445,7 @@ impl Studio {
 
     fn view(&mut self, planned: &Planned) -> Reply {
         let described = self.described(&planned.job, &planned.machine);
-        let (meta, columns) = self.view_of(planned).data_with(described, Columns::quick());
+        let (meta, columns) = self.view_of(planned).data_with(&described, Columns::quick());
         let ink = planned.placed.bounding_box().map(|ink| [ink.x0, ink.y0, ink.x1, ink.y1]);
         let json = json!({
             "meta": meta,

@@ -130,11 +130,11 @@ impl View<'_> {
 
     /// The same, in these columns.
     pub fn data_into(&self, columns: Columns) -> (Value, Columns) {
-        self.data_with(machine(self.machine), columns)
+        self.data_with(&machine(self.machine), columns)
     }
 
     /// The same, with what [`machine`] said of this machine before.
-    pub fn data_with(&self, machine: Value, mut columns: Columns) -> (Value, Columns) {
+    pub fn data_with(&self, machine: &Value, mut columns: Columns) -> (Value, Columns) {
         let units = self.rows_into(&mut columns);
         let traced = self
             .drawing
@@ -342,7 +342,7 @@ fn prediction_into(prediction: &Prediction<'_>, units: [f64; 2], columns: &mut C
     }
 }
 
-/// The machine as `js/machine.js` reads it.
+/// The machine as `js/machine.js` reads it: linkage, motors, sheet, outlines of the reach.
 pub fn machine(machine: &Machine) -> Value {
     let sheet = machine.sheet();
     let mechanism = machine.mechanism();
