@@ -220,7 +220,8 @@ fn program(backend: &dyn Backend, machine: &Machine, file: &[u8]) -> Result<Prog
         Box::new(table.rows.iter().map(|row| (*row, row.ticks.map(|ticks| ticks as f64))))
     };
     let source = PlanSource::new(&table.header, &rows).on_machine(machine);
-    backend.program(&source, &EncodeOptions::default()).map_err(|error| wrong(error.to_string()))
+    let program = backend.program(&source, &EncodeOptions::default());
+    program.map(|program| program.on_machine(machine)).map_err(|error| wrong(error.to_string()))
 }
 
 impl Sending {
