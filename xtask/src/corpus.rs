@@ -14,7 +14,7 @@ const LIMIT: Duration = Duration::from_secs(10);
 
 /// Additional time for each kilometre of ink: a plan of six kilometres takes two days to draw. It has
 /// 1.9 million rows a kilometre, and the choice of ticks along the path takes 3 to 5 us a row.
-const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(40);
+const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(30);
 
 /// A run may wait this many times longer than it may compute.
 const WAIT: u32 = 4;

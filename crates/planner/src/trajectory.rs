@@ -7,6 +7,7 @@
 
 use std::borrow::Cow;
 use std::collections::VecDeque;
+use std::sync::OnceLock;
 
 use drawing::{Drawing, Line, Segment, Stroke};
 use kinematics::{JointPos, Machine, MotorPos, OutOfReach};
@@ -17,7 +18,7 @@ use crate::{
     backlash,
     error::PlanError,
     joint_path::PathGeometry,
-    rounding::AlongPath,
+    rounding::{AlongPath, Choices},
     settings::{self, Settings, TimingLaw, ToleranceBudget},
     stroke::{PathMotion, PlannedStroke, StrokePlanner, whole_periods},
     time_parametrization::LimitingConstraints,
@@ -28,7 +29,7 @@ const BATCH: usize = 4096;
 
 /// A plan with at most this number of phases is cached, so that its rows can be generated again
 /// without planning again.
-const CACHED_PHASES: usize = 1 << 19;
+const CACHED_PHASES: usize = 1 << 20;
 
 /// The largest number of rows of a plan: 11 days at a period of 1 ms.
 const MAX_ROWS: u64 = 1_000_000_000;
@@ -71,6 +72,8 @@ pub struct Trajectory<'a> {
     budget: ToleranceBudget,
     /// All of its motions, if it is small.
     cached: Option<Vec<Motion>>,
+    /// The ticks chosen along the path, once all rows have been generated.
+    choices: OnceLock<Choices>,
     periods: u64,
     rows: u64,
     times: Times,
@@ -175,6 +178,7 @@ pub fn plan_with_progress<'a>(
         drawing,
         settings: settings.clone(),
         cached: None,
+        choices: OnceLock::new(),
         periods: 0,
         rows: 1,
         times: Times::default(),
@@ -297,20 +301,31 @@ impl Trajectory<'_> {
             lead: MotorPos::ZERO,
             finished: false,
         };
-        let along_path = match self.settings.rounding {
-            Rounding::Nearest => None,
+        let ticks = match (self.settings.rounding, self.choices.get()) {
+            (Rounding::Nearest, _) => Ticks::Nearest,
             // Ticks beside the path would make motors reverse.
-            Rounding::Path if self.machine.has_backlash() => None,
-            Rounding::Path => Some(Box::new(AlongPath::new(self.machine, self.settings.period_us))),
+            (Rounding::Path, _) if self.machine.has_backlash() => Ticks::Nearest,
+            (Rounding::Path, Some(choices)) => Ticks::Known { choices, next: 0 },
+            (Rounding::Path, None) => Ticks::Searched {
+                along_path: Box::new(AlongPath::new(self.machine, self.settings.period_us)),
+                found: Choices::of(self.rows),
+            },
         };
-        Rows { samples, along_path }
+        Rows { samples, ticks, trajectory: self }
     }
 
-    /// Drops the cached motions, so that the rows are planned again, as in a large plan. Returns
-    /// whether there were any.
+    /// Drops the cached motions and choices, so that the rows are planned and rounded again, as in a
+    /// large plan. Returns whether there were any motions.
     #[cfg(feature = "unstable")]
     pub fn drop_cache(&mut self) -> bool {
+        self.forget_choices();
         self.cached.take().is_some()
+    }
+
+    /// Forgets the ticks that were chosen, so that the next rows are searched again.
+    #[cfg(feature = "unstable")]
+    pub fn forget_choices(&mut self) {
+        self.choices.take();
     }
 
     fn motions(&self) -> Motions<'_> {
@@ -489,21 +504,54 @@ impl<'a> Source<'a> {
     }
 }
 
+/// Where [`Rows`] takes the ticks of a row from.
+#[derive(Clone, Debug)]
+enum Ticks<'a> {
+    Nearest,
+    /// A search, and what it has found since the first row.
+    Searched {
+        along_path: Box<AlongPath<'a>>,
+        found: Option<Choices>,
+    },
+    /// An earlier search.
+    Known {
+        choices: &'a Choices,
+        next: usize,
+    },
+}
+
 /// Iterator over the rows of a trajectory.
 #[derive(Clone, Debug)]
 pub struct Rows<'a> {
     samples: Samples<'a>,
-    /// Chooses the ticks; `None` for the nearest ones.
-    along_path: Option<Box<AlongPath<'a>>>,
+    ticks: Ticks<'a>,
+    trajectory: &'a Trajectory<'a>,
 }
 
 impl Iterator for Rows<'_> {
     type Item = ExactRow;
 
     fn next(&mut self) -> Option<ExactRow> {
-        match &mut self.along_path {
-            None => self.samples.next().map(|sample| sample.row),
-            Some(along_path) => along_path.next(&mut self.samples),
+        match &mut self.ticks {
+            Ticks::Nearest => self.samples.next().map(|sample| sample.row),
+            Ticks::Known { choices, next } => {
+                let mut row = self.samples.next()?.row;
+                row.row.ticks = choices.chosen(*next, row.row.ticks);
+                *next += 1;
+                Some(row)
+            }
+            Ticks::Searched { along_path, found } => {
+                let row = along_path.next(&mut self.samples);
+                match (&row, &mut *found) {
+                    (Some(row), Some(found)) => found.push(row.exact.map(to_ticks), row.row.ticks),
+                    (None, Some(all)) if all.are_complete(self.trajectory.rows) => {
+                        let _ = self.trajectory.choices.set(std::mem::take(all));
+                        *found = None;
+                    }
+                    _ => {}
+                }
+                row
+            }
         }
     }
 }

@@ -3,6 +3,8 @@
 
 use drawing::{Drawing, Point, Rect, Segment, Span, Vec2};
 
+use crate::run::Run;
+
 /// Chord error of flattened curves, as a share of the tolerance. It is added to what is measured.
 const FLATNESS: f64 = 1.0 / 500.0;
 
@@ -90,8 +92,34 @@ impl Piece {
             && x0.max(x1) >= -radius
     }
 
+    /// Whether the run may draw this piece: no end of either that is beside the other is farther than
+    /// `radius` from its line. A stroke that the run only crosses leaves the radius.
+    pub(crate) fn is_alongside(&self, run: &Run, radius: f64) -> bool {
+        let radius = radius + self.error;
+        let is_far =
+            |along: f64, across: f64, length: f64| (0.0..=length).contains(&along) && across.abs() > radius;
+        if [run.from, run.to].into_iter().any(|end| {
+            let (along, across) = self.local(end);
+            is_far(along, across, self.length)
+        }) {
+            return false;
+        }
+        let vector = run.to - run.from;
+        let length = vector.hypot2().sqrt();
+        let unit = if length > 0.0 { vector / length } else { Vec2::new(1.0, 0.0) };
+        self.ends().into_iter().all(|end| {
+            let v = end - run.from;
+            !is_far(v.dot(unit), unit.cross(v), length)
+        })
+    }
+
+    fn ends(&self) -> [Point; 2] {
+        [self.start, self.at(self.length)]
+    }
+
     pub(crate) fn bounds(&self) -> Rect {
-        Rect::from_points(self.start, self.at(self.length))
+        let [start, end] = self.ends();
+        Rect::from_points(start, end)
     }
 }
 
@@ -118,20 +146,25 @@ pub(crate) struct PenTarget {
     ends_tree: BoxTree,
 }
 
-/// A bounding box tree of items that are numbered from 0.
+/// A bounding box tree of lines that are numbered from 0.
 #[derive(Clone, Debug)]
 struct BoxTree {
-    /// The items by location, see [`by_position`].
+    /// The lines by location, see [`by_position`].
     order: Vec<u32>,
+    /// The lines in that order: a search reads them in sequence, not from all over the memory.
+    lines: Vec<[f32; 4]>,
+    /// Largest difference of a coordinate from its `f32`, mm.
+    rounding: f64,
     /// `levels[0][i]` bounds the items `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the
     /// boxes of `levels[k]` likewise; the last level is one box.
     levels: Vec<Vec<Rect>>,
 }
 
 impl BoxTree {
-    /// Of at least one item.
-    fn new(boxes: &[Rect]) -> Self {
-        let order = by_position(boxes);
+    /// Of at least one line.
+    fn new(lines: &[[Point; 2]]) -> Self {
+        let boxes: Vec<Rect> = lines.iter().map(|[from, to]| Rect::from_points(*from, *to)).collect();
+        let order = by_position(&boxes);
         let mut levels: Vec<Vec<Rect>> = Vec::new();
         let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
         let bounds = |chunk: &[u32]| chunk.iter().map(|i| boxes[*i as usize]).collect::<Vec<_>>();
@@ -140,12 +173,21 @@ impl BoxTree {
             let next = level.chunks(FAN).map(union).collect();
             levels.push(std::mem::replace(&mut level, next));
         }
+        let all = level[0];
         levels.push(level);
-        Self { order, levels }
+        let largest = [all.x0, all.y0, all.x1, all.y1].into_iter().fold(0.0_f64, |sum, c| sum.max(c.abs()));
+        let compact = |[from, to]: [Point; 2]| [from.x, from.y, to.x, to.y].map(|c| c as f32);
+        Self {
+            lines: order.iter().map(|i| compact(lines[*i as usize])).collect(),
+            rounding: largest * f64::from(f32::EPSILON),
+            order,
+            levels,
+        }
     }
 
-    /// Calls `to` with every item of a lowest box that meets `bounds`.
+    /// Calls `to` with every line that meets `bounds`, and perhaps with others that nearly do.
     fn visit(&self, bounds: Rect, mut to: impl FnMut(u32)) {
+        let wider = bounds.inflate(self.rounding, self.rounding);
         let mut open = vec![(self.levels.len() - 1, 0)];
         while let Some((level, index)) = open.pop() {
             if !meet(self.levels[level][index], bounds) {
@@ -157,15 +199,32 @@ impl BoxTree {
                     children.take_while(|i| *i < self.levels[level - 1].len()).map(|i| (level - 1, i)),
                 );
             } else {
-                self.order[children.start..children.end.min(self.order.len())].iter().for_each(|i| to(*i));
+                let items = children.start..children.end.min(self.order.len());
+                for (line, index) in self.lines[items.clone()].iter().zip(&self.order[items]) {
+                    if line_meets(line.map(f64::from), wider) {
+                        to(*index);
+                    }
+                }
             }
         }
     }
 }
 
+/// Whether a line, given by its ends, and a box have a point in common: they have none if they are apart
+/// along an axis of the box or across the line (separating axes of convex sets).
+fn line_meets([x0, y0, x1, y1]: [f64; 4], bounds: Rect) -> bool {
+    let apart =
+        x0.min(x1) > bounds.x1 || x0.max(x1) < bounds.x0 || y0.min(y1) > bounds.y1 || y0.max(y1) < bounds.y0;
+    let (x, y) = (x1 - x0, y1 - y0);
+    let middle = bounds.center();
+    let across = (x * (middle.y - y0) - y * (middle.x - x0)).abs();
+    let half = 0.5 * (y.abs() * bounds.width() + x.abs() * bounds.height());
+    !(apart || across > half)
+}
+
 impl PenTarget {
     fn new(pen: u16, pieces: Vec<Piece>) -> Self {
-        let all = BoxTree::new(&pieces.iter().map(Piece::bounds).collect::<Vec<_>>());
+        let all = BoxTree::new(&pieces.iter().map(Piece::ends).collect::<Vec<_>>());
         let stroke = |index: usize| pieces.get(index).map(|piece| piece.stroke);
         let mut ends = Vec::new();
         for (index, piece) in pieces.iter().enumerate() {
@@ -176,19 +235,14 @@ impl PenTarget {
                 ends.push((piece.at(piece.length), index as u32));
             }
         }
-        let ends_tree =
-            BoxTree::new(&ends.iter().map(|(end, _)| Rect::from_points(*end, *end)).collect::<Vec<_>>());
+        let ends_tree = BoxTree::new(&ends.iter().map(|(end, _)| [*end, *end]).collect::<Vec<_>>());
         Self { pen, pieces, all, ends, ends_tree }
     }
 
-    /// Calls `to` with the index and bounding box of every piece whose box meets `bounds`.
-    pub(crate) fn visit(&self, bounds: Rect, mut to: impl FnMut(u32, Rect)) {
-        self.all.visit(bounds, |index| {
-            let piece = self.pieces[index as usize].bounds();
-            if meet(piece, bounds) {
-                to(index, piece);
-            }
-        });
+    /// Calls `to` with the index of every piece that meets `bounds`, and perhaps with others that nearly
+    /// do.
+    pub(crate) fn visit(&self, bounds: Rect, to: impl FnMut(u32)) {
+        self.all.visit(bounds, to);
     }
 
     /// Calls `to` with the first or last piece of every stroke that begins or ends in `bounds`.
@@ -212,7 +266,7 @@ impl PenTarget {
 
     /// The nearest piece to `p` and its distance, by branch and bound.
     pub(crate) fn nearest(&self, p: Point) -> (f64, u32) {
-        let BoxTree { order, levels } = &self.all;
+        let BoxTree { order, levels, .. } = &self.all;
         let mut best = (f64::INFINITY, 0);
         let mut open = vec![(0.0, levels.len() - 1, 0)];
         while let Some((at_least, level, index)) = open.pop() {
@@ -340,5 +394,76 @@ impl Target {
 
     pub(crate) fn pen(&self, pen: u16) -> Option<usize> {
         self.pens.binary_search_by_key(&pen, |target| target.pen).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::run::At;
+
+    /// Whether the part of the line within each pair of parallel edges leaves something (Liang and Barsky
+    /// 1984).
+    fn clips(from: Point, to: Point, bounds: Rect) -> bool {
+        let (mut first, mut last) = (0.0_f64, 1.0_f64);
+        for (start, end, low, high) in
+            [(from.x, to.x, bounds.x0, bounds.x1), (from.y, to.y, bounds.y0, bounds.y1)]
+        {
+            let step = end - start;
+            if step == 0.0 {
+                if start < low || start > high {
+                    return false;
+                }
+                continue;
+            }
+            let (a, b) = ((low - start) / step, (high - start) / step);
+            first = first.max(a.min(b));
+            last = last.min(a.max(b));
+        }
+        first <= last
+    }
+
+    proptest! {
+        #[test]
+        fn tree_visits_every_line_that_meets_a_box(
+            ends in prop::collection::vec((-9.0..9.0, -9.0..9.0, -3.0..3.0, -3.0..3.0), 1..120),
+            (x, y, width, height) in (-9.0..9.0, -9.0..9.0, 0.0..2.0, 0.0..2.0),
+            offset in prop::sample::select(vec![0.0, 1e3, 1e6]),
+        ) {
+            let lines: Vec<[Point; 2]> = ends
+                .iter()
+                .map(|(x, y, dx, dy)| [Point::new(x + offset, *y), Point::new(x + dx + offset, y + dy)])
+                .collect();
+            let bounds = Rect::new(x + offset, y, x + width + offset, y + height);
+            let mut found = Vec::new();
+            BoxTree::new(&lines).visit(bounds, |index| found.push(index as usize));
+            found.sort_unstable();
+            let slack = 4.0 * (offset + 12.0) * f64::from(f32::EPSILON);
+            for (index, [from, to]) in lines.iter().enumerate() {
+                if clips(*from, *to, bounds) {
+                    prop_assert!(found.contains(&index), "line {index} is lost");
+                }
+                if found.contains(&index) {
+                    prop_assert!(clips(*from, *to, bounds.inflate(slack, slack)), "line {index} is not near");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn crossing_piece_is_not_alongside_and_drawn_one_is() {
+        let at = At { row: 0, t_us: 0 };
+        let run = Run { from: Point::ZERO, to: Point::new(4.0, 0.1), error: 0.0, at };
+        let piece = |from, to| Piece::new(Point::from(from), Point::from(to), 0.0, 0);
+        for drawn in
+            [piece((-1.0, 0.2), (9.0, 0.0)), piece((1.0, -0.2), (1.5, 0.3)), piece((3.9, 0.3), (3.9, 9.0))]
+        {
+            assert!(drawn.is_alongside(&run, 0.5), "{drawn:?}");
+        }
+        for crossing in [piece((1.0, -2.0), (1.0, 2.0)), piece((-5.0, -3.0), (9.0, 4.0))] {
+            assert!(!crossing.is_alongside(&run, 0.5), "{crossing:?}");
+        }
     }
 }

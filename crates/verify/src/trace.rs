@@ -21,6 +21,17 @@ const MERGE: f64 = 1.0 / 5000.0;
 /// Largest length of a merged run, in tolerances.
 const LONGEST_RUN: f64 = 40.0;
 
+/// The pieces of the drawing that a run is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scope {
+    /// Those of the strokes that are followed.
+    Followed,
+    /// In a crowd, those that the run may draw.
+    Alongside,
+    /// All near it.
+    All,
+}
+
 /// The largest distance of the ink from the drawing, and its location.
 #[derive(Clone, Copy, Debug)]
 struct Worst {
@@ -42,8 +53,8 @@ pub(crate) struct Trace {
     cover: Cover,
     pen: usize,
     chain: Option<Chain>,
-    /// Pieces of this pen that meet `near_bounds`, with their bounding boxes.
-    near: Vec<(u32, Rect)>,
+    /// Pieces of this pen that meet `near_bounds`.
+    near: Vec<u32>,
     near_bounds: Option<Rect>,
     /// `near_bounds` extends the radius by this, mm.
     margin: f64,
@@ -143,11 +154,10 @@ impl Trace {
     fn measure(&mut self, target: &Target, run: Run, before: Option<Run>) {
         let strokes = &target.pens[self.pen];
         let bounds = Rect::from_points(run.from, run.to).inflate(self.radius, self.radius);
-        let mut following = self.follower.advance(strokes, &run, bounds, self.radius, &mut self.candidates);
+        let following = self.follower.advance(strokes, &run, bounds, self.radius, &mut self.candidates);
+        let mut scope = if following { Scope::Followed } else { self.examine(target, &run, bounds) };
         loop {
-            if !following {
-                self.gather(target, bounds);
-                self.select(strokes, &run, bounds);
+            if scope != Scope::Followed {
                 // Strokes that the runs before this one covered in passing, while following.
                 for (run, before) in self.follower.take_recent() {
                     self.cover_all(strokes, &run, before.as_ref());
@@ -156,22 +166,45 @@ impl Trace {
             self.cover_all(strokes, &run, before.as_ref());
             let (nearest, common) = self.nearest_to_ends(strokes, &run);
             if self.follows {
-                if !following && self.candidates.len() > CROWD {
+                let is_crowded = scope == Scope::Alongside || self.candidates.len() > CROWD;
+                if scope != Scope::Followed && is_crowded {
                     self.follower.start(strokes, run.to, self.radius, &self.candidates);
                 }
                 self.follower.remember(run, before, self.radius);
             }
             let largest = self.bound_along(strokes, &run, nearest, common);
             let known = self.worst.map_or(0.0, |worst| worst.mm);
-            if following && (largest > FOLLOWED * self.radius || largest > known) {
-                // A stroke that is not followed may be nearer. All strokes are looked at for the maximum.
+            if scope != Scope::All && (largest > FOLLOWED * self.radius || largest > known) {
+                // Another stroke may be nearer. All strokes are looked at for the maximum.
                 self.follower.fail();
-                following = false;
+                if scope == Scope::Followed {
+                    scope = self.examine(target, &run, bounds);
+                } else {
+                    self.select(strokes, &run, bounds);
+                    scope = Scope::All;
+                }
                 continue;
             }
             self.record(strokes, &run, nearest, largest);
             return;
         }
+    }
+
+    /// Makes the pieces near the run the candidates: all, or in a crowd those alongside it.
+    fn examine(&mut self, target: &Target, run: &Run, bounds: Rect) -> Scope {
+        let strokes = &target.pens[self.pen];
+        self.gather(target, bounds);
+        self.select(strokes, run, bounds);
+        if !self.follows || self.candidates.len() <= CROWD {
+            return Scope::All;
+        }
+        let radius = self.radius;
+        self.candidates.retain(|(_, index)| strokes.pieces[*index as usize].is_alongside(run, radius));
+        if !self.candidates.is_empty() {
+            return Scope::Alongside;
+        }
+        self.select(strokes, run, bounds);
+        Scope::All
     }
 
     /// For each end of the run the nearest piece with its distance; and the distances of both ends
@@ -264,9 +297,11 @@ impl Trace {
     fn select(&mut self, strokes: &PenTarget, run: &Run, bounds: Rect) {
         self.candidates.clear();
         let radius = self.radius;
-        let may_be_near = |index: u32| strokes.pieces[index as usize].may_be_near(run.from, run.to, radius);
-        let meeting = self.near.iter().filter(|(index, piece)| meet(*piece, bounds) && may_be_near(*index));
-        self.candidates.extend(meeting.map(|(index, _)| (0.0, *index)));
+        let may_be_near = |index: &&u32| {
+            let piece = &strokes.pieces[**index as usize];
+            meet(piece.bounds(), bounds) && piece.may_be_near(run.from, run.to, radius)
+        };
+        self.candidates.extend(self.near.iter().filter(may_be_near).map(|index| (0.0, *index)));
     }
 
     /// Ensures that `near` holds every piece that meets `bounds`. A wider list is kept while the
@@ -286,7 +321,7 @@ impl Trace {
         }
         let wider = bounds.inflate(self.margin, self.margin);
         self.near.clear();
-        target.pens[self.pen].visit(wider, |index, piece| self.near.push((index, piece)));
+        target.pens[self.pen].visit(wider, |index| self.near.push(index));
         self.near_bounds = Some(wider);
     }
 

@@ -106,7 +106,12 @@ fn compare(
         let (nearest, along) = (planned(Rounding::Nearest)?, planned(Rounding::Path)?);
         let [before, after] = [&nearest, &along].map(|plan| figures(machine, plan));
         let inked = nearest.rows().filter(|row| row.row.pen != 0).count();
-        let [(_, plain), (_, chosen)] = [&nearest, &along].map(|plan| fastest(|| plan.rows().count()));
+        let mut searched = along.clone();
+        let (_, plain) = fastest(|| nearest.rows().count());
+        let (_, chosen) = fastest(|| {
+            searched.forget_choices();
+            searched.rows().count()
+        });
         let row_us = (chosen - plain) * 1e6 / inked as f64;
         let (was, is) = (before.array(), after.array());
         let shares: [f64; 5] = std::array::from_fn(|index| is[index] / was[index]);

@@ -27,6 +27,7 @@
 //! rows old: memory is constant, and rows do not depend on the number of threads.
 
 mod bounds;
+mod choices;
 mod curve;
 mod search;
 
@@ -35,6 +36,7 @@ use std::collections::VecDeque;
 use drawing::{Point, Vec2};
 use kinematics::{JointPos, Machine, MotorPos};
 
+pub(crate) use self::choices::Choices;
 use self::{
     bounds::{Bounds, Differences},
     curve::Curve,
