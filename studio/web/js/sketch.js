@@ -184,6 +184,8 @@ export class Sketch {
     disable("undo", this.strokes.length === 0);
     disable("redo", this.undone.length === 0);
     disable("clear", this.strokes.length === 0);
+    byId("add").hidden = this.isOn || !this.studio.hasDrawing;
+    if (!this.studio.hasDrawing) for (const id of ["pens-field", "page-field", "svg-fields"]) byId(id).hidden = true;
     this.showArea();
     viewer.draw();
   }
@@ -213,6 +215,7 @@ export class Sketch {
       studio.state.file = null;
       studio.outline = null;
       byId("facts").replaceChildren();
+      this.show();
       return studio.changed(false);
     }
     const [x0, y0, x1, y1] = studio.viewer.meta.machine.sheet_mm;
