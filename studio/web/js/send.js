@@ -249,7 +249,7 @@ export class Sender {
     if (progress) {
       this.bar.value = progress.of_us > 0 ? progress.done_us / progress.of_us : progress.lines / Math.max(progress.of_lines, 1);
       const again = progress.retransmitted > 0 ? `, ${progress.retransmitted} sent again` : "";
-      byId("send-progress").textContent = `${progress.lines} of ${progress.of_lines} lines${again}; ${time(progress.done_us / 1e6)} of ${time(progress.of_us / 1e6)}`;
+      byId("send-progress").textContent = `${progress.lines} of ${progress.of_lines} lines${again}\n${time(progress.done_us / 1e6)} of ${time(progress.of_us / 1e6)}`;
       // The arm stands where the machine has acknowledged it to be.
       if (this.info?.format === "ticks" && this.from.value === "") this.studio.viewer.seek(progress.done_us / 1e6);
     }
