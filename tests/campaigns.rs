@@ -159,6 +159,10 @@ fn machine(random: &mut Random, dir: &TestDir) -> Machine {
     let pen_us = 10_000 * (5 + random.below(20)) as i64;
     let period_us = pick(random, &[5_000, 10_000, 20_000]);
     let mut limits = [[NO_JERK_LIMIT; 3]; 2];
+    // Random numbers of their own, so that machines without play are those of earlier campaigns.
+    let mut play = Random(random.0 ^ 0x9e37_79b9_7f4a_7c15);
+    let has_backlash = play.below(3) == 0;
+    let mut backlash = [0.0; 2];
     let mut counts = [0.0; 2];
     let mut offsets = [0.0; 2];
     let mut motors = String::new();
@@ -187,6 +191,12 @@ fn machine(random: &mut Random, dir: &TestDir) -> Machine {
             limits[k][2] = acceleration / jerk_s;
             writeln!(motors, "max_jerk = \"{}ticks/s3\"", limits[k][2]).expect("text");
         }
+        // One motor of three has none: up to 1 degree or 0.4 mm otherwise.
+        if has_backlash && play.below(3) > 0 {
+            let most = counts[k].abs() * if geometry.turns[k] { PI / 180.0 } else { 0.4 };
+            backlash[k] = most * play.between(0.05, 1.0);
+            writeln!(motors, "backlash = {}", backlash[k]).expect("text");
+        }
     }
     let Geometry { toml, forward, middle: [x, y], half, .. } = geometry;
     let (x0, y0, size) = (x - half, y - half, 2.0 * half);
@@ -210,6 +220,7 @@ fn machine(random: &mut Random, dir: &TestDir) -> Machine {
         motors: ["m0", "m1"],
         forward: Box::leak(Box::new(motion)),
         start: [0, 0],
+        backlash,
         pen_us,
         period_us,
         every_period: true,
@@ -254,9 +265,10 @@ fn scribble(random: &mut Random) -> String {
     hpgl + "SP0;"
 }
 
-/// Options that change how a plan is made.
-fn options(random: &mut Random) -> String {
+/// Options that change how a plan is made. Motors with play cannot keep to a fixed time for a segment.
+fn options(random: &mut Random, has_backlash: bool) -> String {
     let law = match random.below(8) {
+        1..=3 if has_backlash => "",
         0 => "--law trapezoid",
         1 => "--law linear --segment-time 1s --allow-over-limit",
         2 => "--law sine --segment-time 2s --allow-over-limit",
@@ -269,7 +281,7 @@ fn options(random: &mut Random) -> String {
     format!("--fit {law} {rounding} {order} {rotate}")
 }
 
-/// Random machines of every kind with random drawings, laws, roundings, orders and jerk limits: what is
+/// Random machines of every kind with random drawings, laws, roundings, orders, jerk limits and backlash: what is
 /// planned draws the drawing, by kinematics that are written here.
 #[test]
 fn random_machines_draw_random_drawings() {
@@ -281,7 +293,8 @@ fn random_machines_draw_random_drawings() {
         let mut machine = machine(&mut random, &dir);
         let hpgl = scribble(&mut random);
         dir.write("d.hpgl", &hpgl);
-        let options = options(&mut random);
+        let has_backlash = machine.backlash != [0.0; 2];
+        let options = options(&mut random, has_backlash);
         let arguments = format!("convert d.hpgl -m m.toml {options} -f csv -o p.csv --report json");
         let output = PROGRAM.run(&dir, &arguments);
         let said = stderr(&output);
@@ -292,7 +305,13 @@ fn random_machines_draw_random_drawings() {
                 let within_limits = !options.contains("--allow-over-limit");
                 let result = replayed(&dir, &mut machine, &hpgl, within_limits);
                 assert_eq!(result, Ok(()), "{}", what());
-                *outcomes.entry("drawn".to_owned()).or_default() += 1;
+                let outcome = if has_backlash { "drawn with backlash" } else { "drawn" };
+                *outcomes.entry(outcome.to_owned()).or_default() += 1;
+                // The judge notices the play: without it, most of these plans deviate.
+                let mut rigid = Machine { backlash: [0.0; 2], ..machine };
+                if replayed(&dir, &mut rigid, &hpgl, within_limits).is_err() {
+                    *outcomes.entry("deviating without backlash".to_owned()).or_default() += 1;
+                }
             }
             Some(1) => {
                 let report: serde_json::Value =
@@ -309,8 +328,11 @@ fn random_machines_draw_random_drawings() {
         }
     }
     println!("campaign of {count} random machines, seed {}: {outcomes:?}", seed());
-    let drawn = outcomes.get("drawn").copied().unwrap_or_default();
+    let drawn =
+        outcomes.iter().filter(|(outcome, _)| outcome.starts_with("drawn")).map(|(_, n)| n).sum::<u64>();
     assert!(10 * drawn > 7 * count, "{outcomes:?}");
+    let of = |outcome: &str| outcomes.get(outcome).copied().unwrap_or_default();
+    assert!(2 * of("deviating without backlash") >= of("drawn with backlash"), "{outcomes:?}");
 }
 
 /// Replays the plan in `p.csv`, which starts where the machine file says.

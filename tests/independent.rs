@@ -32,6 +32,8 @@ pub(crate) struct Machine {
     /// Pen position from motor positions.
     pub(crate) forward: &'static dyn Fn([f64; 2]) -> Point,
     pub(crate) start: [i64; 2],
+    /// Play between each motor and its joint, ticks.
+    pub(crate) backlash: [f64; 2],
     /// Lift time and drop time, us.
     pub(crate) pen_us: i64,
     /// Time between rows, us.
@@ -123,12 +125,24 @@ impl Plan {
         libm::hypot(self.placement[0], self.placement[1])
     }
 
-    /// The ink: motors move linearly from row to row; chords of at most 0.2 mm.
+    /// The ink: motors move linearly from row to row, and drag the mechanism behind them where they have
+    /// play; chords of at most 0.2 mm, of 0.02 mm where a motor crosses its play.
     pub(crate) fn ink(&self, machine: &Machine) -> Ink {
         let mut ink = Ink::new();
         let mut pen = 0;
+        let Some(first) = self.rows.first() else { return ink };
+        // Where the mechanism is, in ticks: in the middle of the play at the start.
+        let mut dragged = first.ticks.map(|ticks| ticks as f64);
+        let drag = |at: [f64; 2], motors: [f64; 2]| {
+            [0, 1].map(|k: usize| {
+                let half = 0.5 * machine.backlash[k];
+                at[k].max(motors[k] - half).min(motors[k] + half)
+            })
+        };
         for pair in self.rows.windows(2) {
             let [from, to] = [pair[0], pair[1]].map(|row| row.ticks.map(|ticks| ticks as f64));
+            let (begin, end) = (dragged, drag(dragged, to));
+            dragged = end;
             if pair[0].pen == 0 {
                 pen = 0;
                 continue;
@@ -136,14 +150,17 @@ impl Plan {
             let lines = ink.entry(pair[0].pen).or_default();
             if pen != pair[0].pen {
                 pen = pair[0].pen;
-                lines.push(vec![(machine.forward)(from)]);
+                lines.push(vec![(machine.forward)(begin)]);
             }
+            let crosses = (0..2).any(|k| ((end[k] - begin[k]) - (to[k] - from[k])).abs() > 1e-9);
+            let chord = if crosses { STEP } else { 0.2 };
             // At most 2 m between two rows, for plans that are not sound.
-            let parts = (distance((machine.forward)(from), (machine.forward)(to)) / 0.2).ceil().min(1e4);
+            let parts = (distance((machine.forward)(begin), (machine.forward)(end)) / chord).ceil().min(1e4);
+            let mut at = begin;
             for part in 1..=parts as i64 {
                 let share = part as f64 / parts;
-                let ticks = [0, 1].map(|motor| from[motor] + share * (to[motor] - from[motor]));
-                lines.last_mut().expect("just begun").push((machine.forward)(ticks));
+                at = drag(at, [0, 1].map(|motor| from[motor] + share * (to[motor] - from[motor])));
+                lines.last_mut().expect("just begun").push((machine.forward)(at));
             }
         }
         ink

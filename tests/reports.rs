@@ -283,3 +283,22 @@ fn help_lists_the_exit_codes() {
     }
     assert!(text(&run(&dir, "schema --markdown").stdout) == page, "docs/reports.md is not up to date");
 }
+
+/// Pages that the program prints are committed as it prints them. `INSTA_UPDATE=always` writes them anew, as
+/// for snapshots.
+#[test]
+#[expect(clippy::disallowed_methods, reason = "insta reads the same variable")]
+fn generated_pages_are_up_to_date() {
+    let dir = folder();
+    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+    for (arguments, page) in
+        [("schema machine --markdown", "machine-keys.md"), ("explain formats", "format-table.md")]
+    {
+        let printed = text(&run(&dir, arguments).stdout);
+        if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
+            std::fs::write(docs.join(page), &printed).expect("a page");
+        }
+        let committed = std::fs::read_to_string(docs.join(page)).unwrap_or_default();
+        assert!(committed == printed, "docs/{page} differs: plotplan {arguments} > docs/{page}");
+    }
+}

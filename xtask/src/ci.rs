@@ -1,10 +1,9 @@
 //! Every check that a change must pass: `cargo xtask ci`, which `.ci/run` calls.
 
-use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 
 /// One check: name, description and function. The function returns an error if the check fails.
 struct Step {
@@ -38,7 +37,7 @@ const STEPS: &[Step] = &[
     }),
     step("corpus", "every drawing of ../shared/corpus, where it exists", corpus),
     step("web-test", "animated previews in a browser; installs Node.js, npm packages and Chromium", web_test),
-    step("fuzz", "one minute of fuzzing; installs nightly and cargo-fuzz if missing", fuzz),
+    step("fuzz", "8 s of fuzzing for each target", fuzz),
     on_request("firmware", "the firmware on an emulated ATmega328P; installs Debian packages", firmware),
     on_request("verify-package", "every crate builds from its package", || {
         cargo("package --workspace --exclude xtask --locked --allow-dirty")
@@ -53,10 +52,8 @@ const STEPS: &[Step] = &[
 /// other seeds.
 const PROPTEST_SEED: &str = "20261122";
 
-/// Fuzz targets (`fuzz/fuzz_targets`), seconds for each.
-pub(crate) const FUZZ_TARGETS: &[&str] =
-    &["read", "emit", "svg", "recognize", "plans", "machines", "answers"];
-const FUZZ_SECONDS: u32 = 8;
+/// Seconds for each fuzz target (`fuzz/fuzz_targets`).
+const FUZZ_SECONDS: u64 = 8;
 
 /// Runs the named steps, or the default ones, up to the first failure; prints the time of each.
 pub(crate) fn run_steps(names: &[&str]) -> Result<bool> {
@@ -204,56 +201,7 @@ fn web_test() -> Result<()> {
     Ok(())
 }
 
-/// Fuzzes every target from the project's own drawings. Fails if a nightly compiler or cargo-fuzz is
-/// missing and cannot be installed.
+/// Fuzzes every target from the project's own files.
 fn fuzz() -> Result<()> {
-    if !succeeds("cargo", "+nightly --version") {
-        run("rustup", "toolchain install nightly --profile minimal").context("fuzzing needs nightly Rust")?;
-    }
-    if !succeeds("cargo", "+nightly fuzz --version") {
-        cargo("install cargo-fuzz --locked").context("fuzzing needs cargo-fuzz")?;
-    }
-    for target in FUZZ_TARGETS {
-        fuzz_target(target, FUZZ_SECONDS, None)?;
-    }
-    Ok(())
-}
-
-/// Fuzzes one target from the project's own files.
-pub(crate) fn fuzz_target(target: &str, seconds: u32, seed: Option<u64>) -> Result<()> {
-    let seeds = crate::top().join("fuzz/corpus").join(target);
-    std::fs::create_dir_all(&seeds).with_context(|| format!("{}", seeds.display()))?;
-    let (folders, extensions, dictionary): (&[_], &[_], _) = match target {
-        "svg" => (&["examples"], &["svg"], Some("svg.dict")),
-        "recognize" => (&["examples", "tests/drawings"], &["hpgl", "pcl", "svg"], Some("svg.dict")),
-        "plans" => (&["fuzz/seeds"], &["csv", "ticks"], None),
-        "machines" => (&["crates/compiler/machines", "tests/machines"], &["toml"], None),
-        "answers" => (&["fuzz/seeds"], &["answers"], None),
-        _ => (&["examples", "tests/drawings"], &["hpgl", "pcl"], Some("hpgl.dict")),
-    };
-    for folder in folders {
-        copy_drawings(&crate::top().join(folder), &seeds, extensions)?;
-    }
-    let dictionary = dictionary.map_or_else(String::new, |file| format!("-dict=fuzz/{file}"));
-    let seed = seed.map_or_else(String::new, |seed| format!("-seed={}", seed as u32));
-    cargo(&format!(
-        "+nightly fuzz run {target} -- {dictionary} {seed} -max_len=4096 -timeout=20 \
-         -max_total_time={seconds} -verbosity=0"
-    ))
-}
-
-fn copy_drawings(from: &Path, to: &Path, extensions: &[&str]) -> Result<()> {
-    let mut copied = 0;
-    for entry in std::fs::read_dir(from).with_context(|| format!("{}", from.display()))? {
-        let path = entry?.path();
-        if path.extension().is_some_and(|e| extensions.iter().any(|known| e == *known)) {
-            let name = path.file_name().context("a file without a name")?;
-            std::fs::copy(&path, to.join(name)).with_context(|| format!("{}", path.display()))?;
-            copied += 1;
-        }
-    }
-    if copied == 0 {
-        bail!("no files of {extensions:?} in {}", from.display());
-    }
-    Ok(())
+    crate::fuzz::Fuzzers::build()?.run_all(FUZZ_SECONDS)
 }

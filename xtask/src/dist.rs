@@ -25,7 +25,7 @@ const TARGETS: &[Target] = &[
 ];
 
 /// Runs on the machine that builds: man pages and completions are printed by it.
-const NATIVE: &str = "x86_64-unknown-linux-musl";
+pub(crate) const NATIVE: &str = "x86_64-unknown-linux-musl";
 /// The Debian package and the wheel contain this one too.
 const MAINTAINER: &str = "The plotplan maintainers <plotplan@users.noreply.example>";
 const FILES: &[&str] = &["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"];
@@ -58,12 +58,12 @@ pub(crate) fn run(words: &[&str]) -> Result<bool> {
         std::path::absolute(program)?
     } else {
         crate::web::build()?;
-        build(&TARGETS[0])?
+        build(NATIVE)?
     };
     let extras = extras(&native, &out)?;
     let mut failed = Vec::new();
     for target in targets {
-        let built = if target.triple == NATIVE { Ok(native.clone()) } else { build(target) };
+        let built = if target.triple == NATIVE { Ok(native.clone()) } else { build(target.triple) };
         match built.and_then(|program| archive(target, &program, &extras, &out)) {
             Ok(file) => println!("{}", file.display()),
             // A system that cannot be built here does not keep the others back.
@@ -90,8 +90,10 @@ fn triples() -> Vec<&'static str> {
     TARGETS.iter().map(|target| target.triple).collect()
 }
 
-/// Builds the program for a target; returns its path.
-fn build(target: &Target) -> Result<PathBuf> {
+/// Builds the program for a target, with the studio that `cargo xtask web` made; returns its path.
+pub(crate) fn build(triple: &str) -> Result<PathBuf> {
+    let known = TARGETS.iter().find(|target| target.triple == triple);
+    let target = known.with_context(|| format!("targets are {}", triples().join(", ")))?;
     execute(Command::new("rustup").args(["target", "add", target.triple]))?;
     let mut command = Command::new("cargo");
     command.arg(if target.by_rust { "build" } else { "zigbuild" });
@@ -286,19 +288,32 @@ pub(crate) fn set_version(to: &str) -> Result<bool> {
         writeln!(text, "{line}")?;
     }
     write(&path, text)?;
-    // Lock files name the version too.
+    // The Arduino library has the version of the program that writes its machine header.
+    let path = crate::top().join(LIBRARY);
+    let library =
+        std::fs::read_to_string(&path)?.replace(&format!("version={from}\n"), &format!("version={to}\n"));
+    write(&path, library)?;
+    // Lock files name the version too: that of the workspace, and that of the fuzz targets.
     execute(Command::new("cargo").args(["update", "--workspace", "--offline"]))?;
+    let metadata = ["metadata", "--format-version", "1", "--offline", "--manifest-path", "fuzz/Cargo.toml"];
+    output_of(Command::new("cargo").args(metadata).current_dir(crate::top()))?;
     println!("{from} -> {}", version()?);
     Ok(true)
 }
 
-/// The requirements between crates whose version is not that of the workspace; for `tidy`.
-pub(crate) fn other_versions(manifest: &str) -> Result<Vec<String>> {
+/// The description of the Arduino library.
+pub(crate) const LIBRARY: &str = "firmware/library.properties";
+
+/// Versions that are not that of the workspace: requirements between crates, the Arduino library; for `tidy`.
+pub(crate) fn other_versions(manifest: &str, library: &str) -> Result<Vec<String>> {
     let table: toml::Table = manifest.parse()?;
     let workspace = &table["workspace"];
     let version = workspace["package"]["version"].as_str().context("a version")?;
     let dependencies = workspace["dependencies"].as_table().context("dependencies")?;
     let mut found = Vec::new();
+    if !library.lines().any(|line| line.strip_prefix("version=") == Some(version)) {
+        found.push(format!("{LIBRARY}: not version {version}: `cargo xtask version {version}`"));
+    }
     for (name, dependency) in dependencies {
         let stated = dependency.get("version").and_then(toml::Value::as_str);
         let is_ours = dependency.get("path").is_some();
@@ -323,7 +338,9 @@ mod tests {
                  drawing = {{ path = \"crates/drawing\", version = \"{version}\" }}\nlibm = \"0.2.16\"\n"
             )
         };
-        assert_eq!(other_versions(&manifest("0.2.0")).unwrap(), [] as [String; 0]);
-        assert_eq!(other_versions(&manifest("0.1.0")).unwrap().len(), 1);
+        let library = "name=plotplan\nversion=0.2.0\n";
+        assert_eq!(other_versions(&manifest("0.2.0"), library).unwrap(), [] as [String; 0]);
+        assert_eq!(other_versions(&manifest("0.1.0"), library).unwrap().len(), 1);
+        assert_eq!(other_versions(&manifest("0.2.0"), "version=0.2.1\n").unwrap().len(), 1);
     }
 }

@@ -10,6 +10,7 @@ mod ci;
 mod corpus;
 mod dist;
 mod firmware;
+mod fuzz;
 mod inkscape;
 mod order;
 mod peers;
@@ -54,8 +55,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
                 build the site from docs/ below target/site with mdbook, and check its links
   trust [CAMPAIGN …] [--seed N] [--percent P]
                 the campaigns behind docs/trust.md, all or those named
-  nightly [CAMPAIGN …] [--percent P]
-                the same with a new seed
+  nightly [CAMPAIGN …] [--percent P] [--short]
+                the same with a new seed; --short is one per cent of each
   bench order GENERATOR
                 order the drawings of the script GENERATOR (python3 with numpy); compare with
                 reference solutions

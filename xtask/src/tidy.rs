@@ -132,7 +132,8 @@ pub(crate) fn run() -> Result<bool> {
         violations.extend(untidy(file, &std::fs::read(top.join(file)).unwrap_or_default()));
     }
     let workspace = std::fs::read_to_string(top.join("Cargo.toml")).context("Cargo.toml")?;
-    violations.extend(crate::dist::other_versions(&workspace)?);
+    let library = std::fs::read_to_string(top.join(crate::dist::LIBRARY)).context(crate::dist::LIBRARY)?;
+    violations.extend(crate::dist::other_versions(&workspace, &library)?);
     for violation in &violations {
         println!("{violation}");
     }

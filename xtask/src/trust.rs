@@ -9,7 +9,8 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use crate::programs::{execute, has, output_of, text_of};
+use crate::fuzz::{Fuzzers, Run, TARGETS};
+use crate::programs::{execute, has};
 
 /// What a campaign is given.
 #[derive(Clone, Copy, Debug)]
@@ -109,11 +110,18 @@ pub(crate) fn run(arguments: &[&str]) -> Result<bool> {
     Ok(!failed)
 }
 
-/// All campaigns with a seed of their own: the seconds since 1970, unless one is given.
+/// All campaigns with a seed of their own: the seconds since 1970, unless one is given. `--short` is one per
+/// cent of each, to see that all of them run.
 pub(crate) fn nightly(arguments: &[&str]) -> Result<bool> {
     let seed = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH)?.as_secs().to_string();
     let mut all = vec!["--seed", &seed];
-    all.extend(arguments);
+    for argument in arguments {
+        all.extend(if *argument == "--short" {
+            &["--percent", "1"][..]
+        } else {
+            std::slice::from_ref(argument)
+        });
+    }
     println!("a finding becomes a test named after it; its seed, case and files are printed");
     run(&all)
 }
@@ -131,7 +139,7 @@ fn tests(binary: &str, filter: &str, scale: Scale, settings: &[(&str, u64)]) -> 
 
 /// Writes plans to a file system of 64 kB until it is full, three times with each format.
 fn small_disk(_scale: Scale) -> Result<()> {
-    let program = release()?;
+    let program = std::path::absolute(released(crate::dist::NATIVE)?)?;
     let folder = tempfile::tempdir()?;
     let mount = |command: &str, words: &[&str]| {
         execute(Command::new(command).args(words).arg(folder.path())).context("tmpfs needs root")
@@ -162,10 +170,10 @@ fn fill(program: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The release build of the program.
-fn release() -> Result<PathBuf> {
-    execute(Command::new("cargo").args(["build", "--release", "--locked", "-p", "plotplan"]))?;
-    Ok(crate::top().join("target/release/plotplan"))
+/// The program of a release for a target.
+fn released(target: &str) -> Result<PathBuf> {
+    crate::web::build()?;
+    crate::dist::build(target)
 }
 
 /// Machines and drawings of [`same_bytes`]: 10 x 6 plans.
@@ -180,45 +188,93 @@ const BYTES_DRAWINGS: [&str; 6] = [
     "tests/drawings/labels.hpgl",
 ];
 
-/// Targets of [`same_bytes`], each with what runs its programs.
-const BYTES_TARGETS: [(&str, &[&str]); 3] = [
-    ("x86_64-unknown-linux-musl", &[]),
-    ("aarch64-unknown-linux-musl", &["qemu-aarch64"]),
-    ("wasm32-wasip1", &["node", "--no-warnings", "xtask/src/wasi.mjs"]),
-];
-
-/// Plans by `crates/compiler/examples/digests.rs` on every target; prints the SHA-256 of their rows.
+/// Plans by the programs of a release, for x86-64, for aarch64 under qemu, and by the studio's WebAssembly
+/// module in Node.js: their tick lines must be the same.
 fn same_bytes(_scale: Scale) -> Result<()> {
-    let top = crate::top();
-    let mut digests: BTreeMap<&str, String> = BTreeMap::new();
-    for (target, runner) in BYTES_TARGETS {
-        execute(Command::new("rustup").args(["target", "add", target]))?;
-        let mut build = Command::new("cargo");
-        build.args(["build", "--release", "--locked", "-p", "plotplan-compiler", "--example", "digests"]);
-        build.args(["--target", target]);
-        // Pure Rust: the linker of Rust is enough, without a C compiler for the target.
-        build.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld");
-        execute(&mut build)?;
-        let extension = if target.starts_with("wasm") { ".wasm" } else { "" };
-        let program = format!("target/{target}/release/examples/digests{extension}");
-        let mut words: Vec<&str> = runner.to_vec();
-        words.push(&program);
-        let mut command = Command::new(words[0]);
-        command.args(&words[1..]).arg(BYTES_MACHINES).args(BYTES_DRAWINGS).current_dir(&top);
+    let programs = [
+        ("x86-64", Vec::new(), released(crate::dist::NATIVE)?),
+        ("aarch64", vec!["qemu-aarch64"], released("aarch64-unknown-linux-musl")?),
+    ];
+    let mut names = Vec::new();
+    let mut plans: BTreeMap<&str, Plans> = BTreeMap::new();
+    let folder = tempfile::tempdir()?;
+    for drawing in BYTES_DRAWINGS {
+        let name = drawing.rsplit('/').next().context("a name")?;
+        std::fs::copy(crate::top().join(drawing), folder.path().join(name))?;
+        names.push(name);
+    }
+    for (processor, runner, program) in &programs {
         let start = Instant::now();
-        digests.insert(target, text_of(&mut command)?);
-        println!("{target}: {:.1} s", start.elapsed().as_secs_f64());
+        plans.insert(processor, made_by(runner, &std::path::absolute(program)?, folder.path(), &names)?);
+        println!("{processor}: {:.1} s", start.elapsed().as_secs_f64());
     }
-    let first = &digests[BYTES_TARGETS[0].0];
-    let plans = first.lines().filter(|line| !line.ends_with("refused")).count();
-    for (target, text) in &digests {
-        for (a, b) in first.lines().zip(text.lines()) {
-            ensure!(a == b, "{target}:\n{a}\n{b}");
+    let start = Instant::now();
+    let mut node = Command::new("node");
+    node.args(["xtask/src/plans.mjs", "target/studio"]).arg(folder.path()).arg(BYTES_MACHINES).args(&names);
+    execute(&mut node)?;
+    println!("wasm32: {:.1} s", start.elapsed().as_secs_f64());
+    plans.insert("wasm32", written(folder.path(), &names)?);
+    compared(&plans)
+}
+
+/// Tick lines by drawing and machine; `None`: refused.
+type Plans = BTreeMap<String, Option<Vec<u8>>>;
+
+/// The plans that a program makes, `runner` being what executes it.
+fn made_by(runner: &[&str], program: &Path, folder: &Path, drawings: &[&str]) -> Result<Plans> {
+    for (number, drawing) in drawings.iter().enumerate() {
+        for machine in BYTES_MACHINES.split(' ') {
+            let mut command = match runner {
+                [first, rest @ ..] => {
+                    let mut command = Command::new(first);
+                    command.args(rest).arg(program);
+                    command
+                }
+                [] => Command::new(program),
+            };
+            command.args(["convert", drawing, "-m", machine, "--fit", "--format", "ticks", "--quiet", "-o"]);
+            command.arg(format!("{number}-{machine}.ticks"));
+            let output = command.current_dir(folder).output().context("the program")?;
+            let said = String::from_utf8_lossy(&output.stderr);
+            ensure!(matches!(output.status.code(), Some(0 | 1)), "{machine} {drawing}: {said}");
         }
-        ensure!(text == first, "{target}: {} lines", text.lines().count());
     }
-    println!("{plans} plans of {} have the same bytes on {} targets", first.lines().count(), digests.len());
-    ensure!(plans >= 60, "{plans} plans");
+    written(folder, drawings)
+}
+
+/// The plans in a folder, which are removed.
+fn written(folder: &Path, drawings: &[&str]) -> Result<Plans> {
+    let mut plans = Plans::new();
+    for (number, drawing) in drawings.iter().enumerate() {
+        for machine in BYTES_MACHINES.split(' ') {
+            let file = folder.join(format!("{number}-{machine}.ticks"));
+            let bytes = file.exists().then(|| std::fs::read(&file)).transpose()?;
+            if bytes.is_some() {
+                std::fs::remove_file(&file)?;
+            }
+            plans.insert(format!("{drawing} on {machine}"), bytes);
+        }
+    }
+    Ok(plans)
+}
+
+fn compared(plans: &BTreeMap<&str, Plans>) -> Result<()> {
+    let (name, first) = plans.first_key_value().context("no plans")?;
+    let mut different = Vec::new();
+    for (processor, others) in plans {
+        for (plan, bytes) in first {
+            if others[plan] != *bytes {
+                different.push(format!("{plan}: {processor} differs from {name}"));
+            }
+        }
+    }
+    let planned = first.values().flatten().count();
+    let refused: Vec<&str> =
+        first.iter().filter(|(_, bytes)| bytes.is_none()).map(|(plan, _)| plan.as_str()).collect();
+    println!("{planned} plans, {} bytes; refused: {refused:?}", first.values().flatten().flatten().count());
+    ensure!(different.is_empty(), "{}", different.join("\n"));
+    ensure!(planned >= 60, "{planned} plans");
+    println!("the same bytes on {} processors", plans.len());
     Ok(())
 }
 
@@ -265,13 +321,33 @@ fn has_mutants() -> bool {
     Command::new("cargo").args(["mutants", "--version"]).output().is_ok_and(|output| output.status.success())
 }
 
-/// Fuzzes every target for its share of two CPU-hours, one after the other.
+/// Fuzzes every target for its share of two CPU-hours, one after the other, in rounds of at most three
+/// minutes, so that each has had its turn when the campaign is stopped.
 fn fuzz(scale: Scale) -> Result<()> {
-    let targets = crate::ci::FUZZ_TARGETS;
-    let seconds = scale.of(7200) / targets.len() as u64;
-    for target in targets {
-        crate::ci::fuzz_target(target, seconds.try_into()?, Some(scale.seed))?;
+    const ROUND_S: f64 = 180.0;
+    let fuzzers = Fuzzers::build()?;
+    let share_s = scale.of(7200) as f64 / TARGETS.len() as f64;
+    let mut used = vec![Run { executions: 0, cpu_s: 0.0 }; TARGETS.len()];
+    for round in 0.. {
+        if used.iter().all(|run| run.cpu_s >= share_s) {
+            break;
+        }
+        for (target, used) in TARGETS.iter().zip(&mut used) {
+            let rest_s = share_s - used.cpu_s;
+            if rest_s <= 0.0 {
+                continue;
+            }
+            let seconds = rest_s.clamp(1.0, ROUND_S).ceil() as u64;
+            let run = fuzzers.run(target, seconds, Some(scale.seed.wrapping_add(round)))?;
+            used.executions += run.executions;
+            used.cpu_s += run.cpu_s;
+            println!("{target:10} {:10} executions, {:.0} s of processor time", used.executions, used.cpu_s);
+        }
     }
+    let [executions, cpu_s] = used
+        .iter()
+        .fold([0.0, 0.0], |[executions, cpu_s], run| [executions + run.executions as f64, cpu_s + run.cpu_s]);
+    println!("{executions} executions in {cpu_s:.0} s of processor time: no finding");
     Ok(())
 }
 
@@ -281,8 +357,6 @@ pub(crate) fn needs() -> Result<bool> {
         println!("{program:14} {} ({why})", if has(program) { "found" } else { "missing" });
     }
     println!("{:14} {} (mutants)", "cargo-mutants", if has_mutants() { "found" } else { "missing" });
-    let nightly = output_of(Command::new("cargo").args(["+nightly", "fuzz", "--version"])).is_ok();
-    println!("{:14} {} (fuzz)", "cargo-fuzz", if nightly { "found" } else { "missing" });
     if !cfg!(target_os = "linux") {
         bail!("the campaigns are for Linux");
     }

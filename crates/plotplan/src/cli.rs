@@ -18,7 +18,7 @@ use clap_complete::Shell;
 #[cfg(unix)]
 pub(crate) use device::Emulate;
 pub(crate) use device::{Datum, Flow, Jog, PenLift, Send};
-pub(crate) use format::Format;
+pub(crate) use format::{Format, markdown as format_page};
 pub(crate) use ink::{InkColor, with_ink_color};
 pub(crate) use project::{Build, Diff, Init};
 pub(crate) use reading::{PageChoice, Reading, TextForm};
@@ -120,7 +120,7 @@ pub(crate) enum Command {
     Machine(Machine),
     /// Explain a diagnostic's code
     Explain(Explain),
-    /// Print the JSON schema of reports (--report json)
+    /// Print the JSON schema of reports (--report json), or of machine files
     Schema(Schema),
     /// Print a completion script for a shell
     Completions(Completions),
@@ -610,15 +610,27 @@ impl std::fmt::Display for FirmwareDrive {
 
 #[derive(Debug, Args)]
 pub(crate) struct Explain {
-    /// The code, such as H0101; `codes` lists them, `plotters` the plotters and papers that are known
+    /// The code, such as H0101; `codes` lists them, `plotters` the plotters and papers that are known, `formats` the
+    /// formats and protocols as a page
     pub(crate) code: String,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Schema {
-    /// Print the page docs/reports.md instead
+    /// Of what
+    #[arg(value_enum, default_value = "reports")]
+    pub(crate) of: SchemaOf,
+    /// Print it as a page instead: docs/reports.md, docs/machine-keys.md
     #[arg(long)]
     pub(crate) markdown: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SchemaOf {
+    /// --report json
+    Reports,
+    /// Machine files: every key
+    Machine,
 }
 
 #[derive(Debug, Args)]

@@ -26,13 +26,14 @@ use clap::CommandFactory as _;
 use compiler::best_place::{BestFor, Search};
 use compiler::import::{self, Page, PenSettings};
 use compiler::layout::Crop;
+use compiler::machine_file;
 use compiler::pipeline::{Order, Request};
 use compiler::report::Code;
 use drawing::{Pen, Vec2};
 use kinematics::Machine;
 use planner::{Easing, Mirror, PlacementOptions, Scale, TimingLaw};
 
-use crate::cli::{self, Arguments, Command, Planning};
+use crate::cli::{self, Arguments, Command, Planning, SchemaOf};
 use crate::failure::Failure;
 use crate::output;
 
@@ -62,6 +63,9 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
                     out.write_all(import::codes().as_bytes())?;
                     Code::ALL.iter().try_for_each(|code| writeln!(out, "{} {}", code.name(), code.meaning()))
                 });
+            }
+            if explain.code == "formats" {
+                return output::write("-", |out| out.write_all(cli::format_page().as_bytes()));
             }
             if explain.code == "plotters" {
                 return output::write("-", |out| {
@@ -95,10 +99,11 @@ pub(crate) fn run(arguments: &Arguments, command_line: &[String]) -> Result<(), 
             output::write("-", |out| out.write_all(text.as_bytes()))
         }
         Command::Schema(schema) => {
-            let text = if schema.markdown {
-                compiler::report::page::markdown()
-            } else {
-                format!("{:#}\n", compiler::report::page::schema())
+            let text = match (schema.of, schema.markdown) {
+                (SchemaOf::Reports, true) => compiler::report::page::markdown(),
+                (SchemaOf::Reports, false) => format!("{:#}\n", compiler::report::page::schema()),
+                (SchemaOf::Machine, true) => machine_file::markdown(),
+                (SchemaOf::Machine, false) => format!("{:#}\n", machine_file::schema()),
             };
             output::write("-", |out| out.write_all(text.as_bytes()))
         }

@@ -1,6 +1,7 @@
 //! The `[drive]` table of a machine file: motors, loop, setpoints, for simulations.
 
 use kinematics::{Machine, TwoLink};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use simulation::{
     AntiWindup, ArmInertia, CascadeGains, DcParameters, DcSheet, Drive, DriveError, FeedForward, Feedback,
@@ -11,39 +12,53 @@ use super::{MachineFileError, MotorTable};
 use crate::quantity::{self, Dimension, PhysicalUnit, QuantityError};
 
 /// A drive as the file gives it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DriveTable {
+    /// What the loop gets between two rows.
     #[serde(default)]
     setpoints: SetpointsWord,
+    /// With `"vertices"`: both motors are this close, ticks; without it, 20.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     reached_within: Option<f64>,
+    /// Time between calls of the loop; without it, that of the plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     period: Option<String>,
+    /// Time of the first call; without it, 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     phase: Option<String>,
+    /// Proportional gain, % of duty per tick; DC motors need it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     kp: Option<f64>,
+    /// Integral gain, % of duty per tick and s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ki: Option<f64>,
+    /// Derivative gain, % of duty per tick/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     kd: Option<f64>,
+    /// Time constant of the low-pass filter of the derivative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     kd_filter: Option<String>,
+    /// What the integral does while the duty is at its limit; `true` is `"conditional"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     anti_windup: Option<AntiWindupWord>,
+    /// Encoder counts in a tick; without it, 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     counts_per_tick: Option<f64>,
+    /// Shares, 0 to 1, of the duty that the planned motion needs by the model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     feed_forward: Option<FeedForwardTable>,
+    /// Loops of position, speed and current instead of gains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     cascade: Option<CascadeTable>,
+    /// Masses of a two-link arm; needs DC motors by their data sheet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     arm: Option<ArmTable>,
+    /// One table for both motors, or one for each.
     motor: Vec<DriveMotorTable>,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum SetpointsWord {
     Vertices,
@@ -53,14 +68,14 @@ enum SetpointsWord {
 }
 
 /// `true` is the usual kind.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected true, false, \"conditional\", \"clamp\" or \"none\"")]
 enum AntiWindupWord {
     Switch(bool),
     Kind(AntiWindupKind),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum AntiWindupKind {
     None,
@@ -68,104 +83,145 @@ enum AntiWindupKind {
     Clamp,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct FeedForwardTable {
+    /// Share of the duty for the speed.
     speed: f64,
+    /// Share of the duty for the acceleration.
     acceleration: f64,
+    /// Share of the duty for friction.
     friction: f64,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CascadeTable {
+    /// Gain of the position loop, 1/s.
     position: f64,
+    /// Gain of the speed loop, A per tick/s.
     speed_kp: f64,
+    /// Integral gain of the speed loop, A per tick.
     #[serde(default)]
     speed_ki: f64,
+    /// Gain of the current loop, % of duty per A.
     current_kp: f64,
+    /// Integral gain of the current loop, % of duty per A s.
     #[serde(default)]
     current_ki: f64,
+    /// Time over which the speed is measured.
     speed_window: String,
+    /// Time constant of the filter of the current.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     current_filter: Option<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct ArmTable {
+    /// The link at the base.
     link1: LinkTable,
+    /// The link with the pen.
     link2: LinkTable,
+    /// Mass at the elbow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     elbow_mass: Option<String>,
+    /// Mass of the pen and its holder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pen_mass: Option<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct LinkTable {
+    /// Mass.
     mass: String,
+    /// Centre of mass from its joint; without it, the middle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     center: Option<String>,
+    /// Inertia about the centre of mass; without it, that of a rod.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     inertia: Option<String>,
 }
 
 /// A `[[drive.motor]]` table. Which keys belong to which kind is checked when the drive is made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct DriveMotorTable {
+    /// The model.
     kind: MotorKind,
+    /// dc: speed without load per % of duty, `"106.67ticks/s"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     speed_per_duty: Option<String>,
+    /// dc: time constant of the speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     time_constant: Option<String>,
+    /// dc: duty at which it starts to turn, %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stiction: Option<f64>,
+    /// dc: duty that friction takes while it turns, %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     friction: Option<f64>,
+    /// dc: duty that viscous friction takes at the speed of 100 % duty, %.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     viscous: Option<f64>,
+    /// dc: current at 100 % duty and no speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     stall_current: Option<String>,
+    /// dc: limit of the current.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     current_limit: Option<String>,
+    /// dc: supply voltage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     supply: Option<String>,
+    /// dc: resistance of the winding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     resistance: Option<String>,
+    /// dc: torque per current.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     torque_constant: Option<String>,
+    /// dc: inertia of the rotor. stepper: inertia of rotor and load.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     inertia: Option<String>,
+    /// dc: inertia of the load at the output of the gear.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     load_inertia: Option<String>,
+    /// dc: ratio of the gear.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     gear: Option<f64>,
+    /// dc: travel per turn, where `counts` are per length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     travel_per_turn: Option<String>,
+    /// stepper: pairs of speed and torque in increasing order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pull_out: Option<Vec<[String; 2]>>,
+    /// stepper: torque of friction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     friction_torque: Option<String>,
+    /// stepper: microsteps in a full step; without it, 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     microsteps: Option<f64>,
+    /// stepper: full steps in a turn; without it, 200.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     steps_per_turn: Option<f64>,
+    /// rc-servo: its speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rate: Option<String>,
+    /// rc-servo: error that it does not correct, ticks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     dead_band: Option<f64>,
+    /// rc-servo: its smallest step, ticks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     resolution: Option<f64>,
+    /// rc-servo: time between pulses; without it, 20 ms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     frame: Option<String>,
+    /// Play, ticks; without it, that of the `[[motor]]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     backlash: Option<f64>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum MotorKind {
     Ideal,

@@ -1,36 +1,48 @@
 //! `[homing]`: how the machine finds its start pose.
 
 use kinematics::{Homing, HomingAxis, HomingMethod, HomingMove, JointRange, Mechanism, TIMEOUT_FACTOR};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{MachineFileError, MotorTable, dimension};
 use crate::quantity::{self, Dimension};
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct HomingTable {
+    /// What a person does before the start pose is confirmed, instead of `moves`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pose: Option<String>,
+    /// One or two moves towards switches, in their order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     moves: Option<Vec<MoveTable>>,
+    /// Whether `calibrate` measured where the switches are.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     calibrated: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MoveTable {
+    /// The joint that moves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     joint: Option<String>,
+    /// The motor that moves, instead of a joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     motor: Option<String>,
+    /// Name of the switch, or `"stop"` for a mechanical stop.
     towards: String,
+    /// Speed towards it; its sign is the direction.
     speed: String,
+    /// Speed of the second approach; without it, a tenth of `speed`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     slow_speed: Option<String>,
+    /// How far it goes back from the switch.
     back_off: String,
+    /// The longest way to the switch; without it, the range of the joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     travel: Option<String>,
+    /// The move fails after this time; without it, a multiple of `travel` at `speed`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     timeout: Option<String>,
 }

@@ -7,6 +7,7 @@ mod drive;
 mod edit;
 mod error;
 mod homing;
+mod keys;
 mod line;
 mod servo;
 
@@ -16,6 +17,7 @@ use std::sync::Arc;
 use drawing::{Point, Rect, Vec2};
 use kinematics::mechanism::{KINDS, Kind, ParameterError, Parameters};
 use kinematics::{JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, PenLimits};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use simulation::Drive;
 
@@ -23,6 +25,7 @@ pub use self::drive::DriveTable;
 pub use self::edit::{drive_keys, with_drive};
 pub use self::error::{MachineFileError, SyntaxError};
 use self::homing::HomingTable;
+pub use self::keys::{markdown, schema};
 use self::servo::ServoTable;
 use crate::quantity::{self, Dimension, QuantityError};
 
@@ -97,30 +100,42 @@ pub const PRESETS: [Preset; 11] = [
 ];
 
 /// A machine as its file tells it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MachineFile {
+    /// Name of the machine, copied into plans.
     name: String,
+    /// The mechanism and its dimensions.
     geometry: GeometryTable,
+    /// Range of each joint, by its name; without it a joint is free.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     joints: PerJoint<Range>,
+    /// How joints and motors are coupled.
     #[serde(default)]
     coupling: CouplingTable,
+    /// The two motors, in the order of the rows of the coupling matrix.
     motor: Vec<MotorTable>,
+    /// Speed of the pen, and the time that it needs to go up and down.
     pen: PenTable,
+    /// Position and size of the sheet in the machine frame.
     sheet: SheetTable,
+    /// Start pose, where plans start and end: a value for each joint, or `x` and `y` of the pen.
     start: PerJoint<String>,
+    /// How the machine finds its start pose.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     homing: Option<HomingTable>,
+    /// What plans of this machine are like.
     #[serde(default)]
     plan: PlanTable,
+    /// Motors and feedback loop, for `simulate` and `tune`; plans do not depend on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     drive: Option<DriveTable>,
 }
 
 /// The `[geometry]` table: the kind of mechanism and its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "BTreeMap<String, Parameter>", into = "BTreeMap<String, Parameter>")]
+#[schemars(with = "BTreeMap<String, Parameter>")]
 struct GeometryTable {
     kind: Kind,
     /// What the table holds, `kind` included.
@@ -128,7 +143,7 @@ struct GeometryTable {
 }
 
 /// A value in the `[geometry]` table: a number, or text, which may have a unit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "expected a number, text such as \"206mm\", or a point such as [\"-40mm\", \"0mm\"]"
@@ -158,18 +173,21 @@ fn per_joint<'a, T>(
     Ok(names.map(|name| values.get(name)))
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Range {
+    /// Smallest value: an angle where the joint turns, a length where it slides.
     #[serde(skip_serializing_if = "Option::is_none")]
     min: Option<String>,
+    /// Largest value.
     #[serde(skip_serializing_if = "Option::is_none")]
     max: Option<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CouplingTable {
+    /// A row for each motor: `ticks = counts * (matrix * joints) + offset`.
     matrix: [[f64; 2]; 2],
 }
 
@@ -179,47 +197,67 @@ impl Default for CouplingTable {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MotorTable {
+    /// Name of the motor, the header of its column.
     name: String,
+    /// Ticks per unit of its row of the matrix: `"3200/rev"`, `"80/mm"`, `"360/44mm"`; negative
+    /// reverses the direction.
     counts: String,
+    /// Motor position in ticks where its row is 0.
     #[serde(default)]
     offset: f64,
+    /// Largest speed: `"60deg/s"`, `"500mm/s"`, `"2000ticks/s"`.
     max_speed: String,
+    /// Largest acceleration: `"3000deg/s2"`.
     max_acceleration: String,
+    /// Largest jerk: `"90000deg/s3"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     max_jerk: Option<String>,
+    /// Play between motor and mechanism, ticks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     backlash: Option<f64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PenTable {
+    /// Largest speed of the pen while it draws.
     max_speed: String,
+    /// Largest speed of the pen while it is up; without it, the motors limit it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     max_travel_speed: Option<String>,
+    /// Time to lift the pen; the motors are at rest meanwhile.
     lift_time: String,
+    /// Time to lower the pen.
     drop_time: String,
+    /// Pulses of the servo that lifts the pen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     servo: Option<ServoTable>,
+    /// Cartesian machines: where the tips of single pens are, by their numbers, relative to the
+    /// others.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     offset: BTreeMap<String, [String; 2]>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SheetTable {
+    /// Left edge.
     x: String,
+    /// Lower edge.
     y: String,
+    /// Width.
     width: String,
+    /// Height.
     height: String,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct PlanTable {
+    /// Time between rows.
     #[serde(default = "default_period")]
     period: String,
 }

@@ -1,16 +1,19 @@
 //! `[pen] servo`: the pulses of a servo that lifts the pen.
 
 use kinematics::PenServo;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::MachineFileError;
 use crate::quantity::{self, Quantity};
 
 /// Positions as pulses, or as angles with the range of the servo.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ServoTable {
+    /// Position of the pen up: a pulse such as `"1200us"`, or an angle with `pulses` and `range`.
     up: String,
+    /// Position of the pen down.
     down: String,
     /// Pulses at both ends of the range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
