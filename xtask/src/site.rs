@@ -12,6 +12,8 @@ use crate::programs::{commands, execute, has, text_of, write};
 /// Pages outside of docs/.
 const PAGES: &[&str] =
     &["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "firmware/README.md"];
+/// The contents of the site.
+pub(crate) const SUMMARY: &str = "packaging/site/SUMMARY.md";
 /// Where files that are no pages are shown.
 const REPOSITORY: &str = "https://github.com/plotplan/plotplan/blob/main/";
 
@@ -35,7 +37,7 @@ pub(crate) fn run(program: Option<&str>) -> Result<bool> {
     for name in ["book.toml", "site.css"] {
         write(&site.join(name), std::fs::read(packaging.join(name))?)?;
     }
-    write(&source.join("SUMMARY.md"), std::fs::read(packaging.join("SUMMARY.md"))?)?;
+    write(&source.join("SUMMARY.md"), std::fs::read(top.join(SUMMARY))?)?;
     execute(Command::new("mdbook").arg("build").arg(&site))?;
     check_links(&site.join("book"))
 }

@@ -128,7 +128,13 @@ pub(crate) fn run() -> Result<bool> {
         violations.extend(forbidden(&text).with_context(|| format!("{}", manifest.display()))?);
     }
     let listed = Command::new("git").arg("-C").arg(&top).arg("ls-files").output().context("git ls-files")?;
+    let summary = std::fs::read_to_string(top.join(crate::site::SUMMARY)).context(crate::site::SUMMARY)?;
     for file in String::from_utf8_lossy(&listed.stdout).lines() {
+        // Links to a page that the site does not have would lead nowhere.
+        let is_page = file.starts_with("docs/") && file.ends_with(".md");
+        if is_page && !summary.contains(&format!("({file})")) {
+            violations.push(format!("{} does not list {file}", crate::site::SUMMARY));
+        }
         violations.extend(untidy(file, &std::fs::read(top.join(file)).unwrap_or_default()));
     }
     let workspace = std::fs::read_to_string(top.join("Cargo.toml")).context("Cargo.toml")?;
