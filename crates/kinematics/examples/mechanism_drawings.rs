@@ -92,7 +92,7 @@ fn sketches() -> Vec<Sketch> {
         Sketch {
             name: "five-bar",
             mechanism: Box::new(FiveBar {
-                bases: [at(-65.0, 0.0), at(65.0, 0.0)],
+                bases: [at(-80.0, 0.0), at(80.0, 0.0)],
                 proximal_mm: [100.0; 2],
                 distal_mm: [140.0; 2],
                 elbow_left: [true, false],
@@ -101,8 +101,8 @@ fn sketches() -> Vec<Sketch> {
             pen: at(25.0, 160.0),
             window: Rect::new(-170.0, -25.0, 185.0, 180.0),
             notes: vec![
-                At(0, [-28.0, -22.0], "base1"),
-                At(1, [-8.0, -22.0], "base2"),
+                At(0, [-28.0, -24.0], "base1"),
+                At(1, [0.0, -24.0], "base2"),
                 At(2, [-26.0, 4.0], "E1"),
                 At(3, [10.0, 2.0], "E2"),
                 At(4, [12.0, 6.0], "p"),
@@ -123,7 +123,7 @@ fn sketches() -> Vec<Sketch> {
                 At(0, [-34.0, -20.0], "left"),
                 At(1, [-14.0, -24.0], "right"),
                 At(2, [-6.0, -22.0], "p"),
-                Between(0, 2, [-32.0, -6.0], "l left"),
+                Between(0, 2, [-54.0, -8.0], "l left"),
                 Between(1, 2, [6.0, -12.0], "l right"),
             ],
         },
