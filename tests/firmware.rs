@@ -780,3 +780,20 @@ fn formats_page_lists_every_format() {
         assert!(text.contains(&format!("`{format}`")), "docs/formats.md does not list {format}");
     }
 }
+
+/// Both durations that `convert` reports; the settings are those of the file.
+#[test]
+fn grbl_keeps_to_the_plan() {
+    let one_pen = ["examples/zot.hpgl", "examples/house.hpgl", "tests/drawings/spiral.hpgl", "examples/rosette.hpgl"];
+    for machine in ["cartesian", "corexy", "coaxial"] {
+        for file in one_pen {
+            let text = convert(file, machine, "gcode-grbl", &[]);
+            let (times, settings) = text.split_once('\n').expect("lines");
+            let settings = settings.lines().next().expect("settings");
+            assert!(settings.starts_with("; $1=255 $11=") && settings.contains(" $121="), "{settings}");
+            let share = times.split(['(', '%']).nth(1).and_then(|share| share.trim().parse::<f64>().ok());
+            let share = share.expect(times);
+            assert!(share.abs() <= 2.0, "{file}, {machine}: {times}");
+        }
+    }
+}

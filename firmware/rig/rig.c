@@ -8,7 +8,7 @@
  *     --dc G,TAU,S,F    DC motors: ticks/s per percent, s, stiction and friction in percent
  *     --start T1,T2     ticks of the motors at power-up
  *     --switch N,M,POS  switch N (1, 2, or 4 for stop) is closed while motor M is at or below POS
- *     --at S,EVENT      S seconds after the first motion: reset, hang, unplug1, unplug2,
+ *     --at S,EVENT      S seconds after the first motion: reset, power, hang, unplug1, unplug2,
  *                       close1, close2, close4, open1, open2, open4
  *     --garble-in N, --garble-out N   one byte in N is damaged, to and from the chip; N > 40
  *     --seed N          of these
@@ -306,6 +306,7 @@ static void feed(avr_irq_t *receiver) {
 
 /* ---- interrupts ---- */
 #define VECTORS 26
+#define MCUSR_AT 0x54
 static struct { uint64_t calls, cycles, longest; } vectors[VECTORS];
 static struct { int vector; uint16_t sp; uint64_t start, nested; } stack[8];
 static int depth, resets;
@@ -379,10 +380,27 @@ static struct { double s; char what[16]; } events[16];
 static int event_count, events_done;
 static uint32_t hang_at;
 
+/* Power is lost for half a second: RAM holds anything afterwards, EEPROM what it held, and bytes that arrive
+ * meanwhile are lost. */
+static void lose_power(void) {
+    avr_reset(avr);
+    for (uint32_t at = 0x100; at <= avr->ramend; at++) {
+        avr->data[at] = (uint8_t)(at * 167 + 13);
+    }
+    avr->data[MCUSR_AT] = 1; /* PORF */
+    usleep(500000);
+    uint8_t lost[256];
+    while (read(master, lost, sizeof lost) > 0) {
+    }
+    pending_from = pending_to = 0;
+}
+
 static void do_event(const char *what) {
     fprintf(stderr, "rig: %s\n", what);
     if (!strcmp(what, "reset")) {
         avr_reset(avr);
+    } else if (!strcmp(what, "power")) {
+        lose_power();
     } else if (!strcmp(what, "hang")) {
         avr->pc = hang_at;
     } else if (!strncmp(what, "unplug", 6)) {

@@ -1,12 +1,12 @@
-/* Step and direction pins of two drivers: one interrupt of timer 1 at each step, of either motor. */
-#if defined(__AVR__)
+/* Step and direction pins of two drivers: one timer interrupt at each step, of either motor. */
+#if defined(__AVR__) || defined(PLOTPLAN_MICROBIT)
 
 #include <stddef.h>
 
 #include "drive.h"
 #include "machine.h"
 #include "pen.h"
-#include "port_avr.h"
+#include "port_pins.h"
 #include "step_clock.h"
 
 /* The interrupt's speed sets the largest step rate; the 300 bytes more are well spent. */
@@ -28,8 +28,9 @@ static volatile bool running;
 static volatile bool ran_dry;
 static volatile uint8_t pen_wanted;
 static uint8_t pen_set_to;
-/* Where the motors will be at the end of the piece: one addition a piece instead of one a step. */
-static volatile int32_t end1, end2;
+/* Where the motors will be once all prepared pieces are executed. What is left of them is subtracted when the
+ * position is asked for, which costs the interrupt nothing. */
+static int32_t end1, end2;
 static struct cutter cutter;
 /* `poll` drops what it prepared if this changed meanwhile. */
 static volatile uint8_t halts;
@@ -53,8 +54,7 @@ static void init(void) {
     PIN_INPUT_PULLUP(PIN_STEP_LIMIT1);
     PIN_INPUT_PULLUP(PIN_STEP_LIMIT2);
     reversed = (machine->motor[0].reversed ? 1 : 0) | (machine->motor[1].reversed ? 2 : 0);
-    TCCR1A = 0;
-    TCCR1B = _BV(CS11); /* half us */
+    STEP_START();
 }
 
 /* Loads the next piece, which begins at `now`; false if there is none. */
@@ -70,8 +70,6 @@ static inline bool load_piece(uint16_t now) {
     piece_end = now + piece->duration;
     piece_moves = clock1.left || clock2.left;
     backwards = piece->backwards;
-    end1 += backwards & 1 ? -(int32_t)clock1.left : (int32_t)clock1.left;
-    end2 += backwards & 2 ? -(int32_t)clock2.left : (int32_t)clock2.left;
     pen_wanted = piece->pen;
     uint8_t pins = backwards ^ reversed;
     if (pins & 1) {
@@ -92,10 +90,11 @@ static inline uint16_t time_to_next_event(uint16_t now) {
     return step_clock_wait(&clock2, now, step_clock_wait(&clock1, now, piece_end - now));
 }
 
-ISR(TIMER1_COMPA_vect) {
+STEP_INTERRUPT {
     uint16_t now = event;
+    STEP_ACKNOWLEDGE();
     /* The flag rises one count after the match, so a cleared flag may rise again. */
-    if ((int16_t)(TCNT1 - now) < 0) {
+    if ((int16_t)(STEP_COUNT() - now) < 0) {
         return;
     }
     for (;;) {
@@ -113,22 +112,22 @@ ISR(TIMER1_COMPA_vect) {
             step_clock_advance(&clock2);
         }
         if (now == piece_end && !load_piece(now)) {
-            TIMSK1 = 0;
+            STEP_DISABLE();
             break;
         }
         uint16_t wait = time_to_next_event(now);
         uint16_t next = now + wait;
-        OCR1A = next;
+        STEP_MATCH(next);
         event = next;
-        if ((uint16_t)(TCNT1 - now) + MATCH_MARGIN < wait) {
+        if ((uint16_t)(STEP_COUNT() - now) + MATCH_MARGIN < wait) {
             break;
         }
         PIN_LOW(PIN_STEP1);
         PIN_LOW(PIN_STEP2);
-        while ((uint16_t)(TCNT1 - now) < wait) {
+        while ((uint16_t)(STEP_COUNT() - now) < wait) {
         }
         now = next;
-        TIFR1 = _BV(OCF1A);
+        STEP_CLEAR();
     }
     PIN_LOW(PIN_STEP1);
     PIN_LOW(PIN_STEP2);
@@ -142,11 +141,23 @@ static void set_position(int32_t ticks1, int32_t ticks2) {
     port_unlock(state);
 }
 
+static int32_t towards(uint8_t is_backwards, uint16_t steps) {
+    return is_backwards ? -(int32_t)steps : (int32_t)steps;
+}
+
+/* Steps wait while interrupts are off, so only what the step interrupt changes is read then. Pieces stay as they
+ * are: the main loop prepares them, and this is called by it or interrupts it. */
 static void position(int32_t ticks[2]) {
     uint8_t state = port_lock();
-    ticks[0] = backwards & 1 ? end1 + clock1.left : end1 - clock1.left;
-    ticks[1] = backwards & 2 ? end2 + clock2.left : end2 - clock2.left;
+    uint8_t first = tail, way = backwards;
+    uint16_t left1 = clock1.left, left2 = clock2.left;
     port_unlock(state);
+    ticks[0] = end1 - towards(way & 1, left1);
+    ticks[1] = end2 - towards(way & 2, left2);
+    for (uint8_t i = first; i != head; i = (i + 1) & (PIECES - 1)) {
+        ticks[0] -= towards(pieces[i].backwards & 1, pieces[i].motor[0].steps);
+        ticks[1] -= towards(pieces[i].backwards & 2, pieces[i].motor[1].steps);
+    }
 }
 
 static bool is_moving(void) {
@@ -167,9 +178,12 @@ static bool prepare(void) {
         cutter_start(&cutter, &segment);
         line_ms = machine_ms();
     }
-    cutter_cut(&cutter, &pieces[head]);
+    struct piece *piece = &pieces[head];
+    cutter_cut(&cutter, piece);
     uint8_t state = port_lock();
     if (seen == halts) {
+        end1 += towards(piece->backwards & 1, piece->motor[0].steps);
+        end2 += towards(piece->backwards & 2, piece->motor[1].steps);
         head = next;
     } else {
         cutter.left = 0;
@@ -181,12 +195,12 @@ static bool prepare(void) {
 static void start(void) {
     uint8_t state = port_lock();
     if (head != tail) {
-        event = TCNT1 + START_LEAD;
+        event = STEP_COUNT() + START_LEAD;
         running = load_piece(event);
         event += time_to_next_event(event);
-        OCR1A = event;
-        TIFR1 = _BV(OCF1A);
-        TIMSK1 = _BV(OCIE1A);
+        STEP_MATCH(event);
+        STEP_CLEAR();
+        STEP_ENABLE();
     }
     port_unlock(state);
 }
@@ -218,7 +232,7 @@ static void tick(void) {
 
 static void halt(void) {
     uint8_t state = port_lock();
-    TIMSK1 = 0;
+    STEP_DISABLE();
     int32_t here[2];
     position(here);
     set_position(here[0], here[1]);

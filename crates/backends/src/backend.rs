@@ -106,6 +106,11 @@ pub trait Backend: fmt::Debug + Send + Sync {
         Err(Unrepresentable::NotWritten { format: self.name() }.into())
     }
 
+    /// What the user should know of the file that [`Self::write`] makes of this plan: lines of text.
+    fn remarks(&self, _plan: &PlanSource<'_>, _options: &EncodeOptions) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Why a program cannot be sent, as far as that is known before the machine is asked.
     fn fault(&self, _program: &Program, _options: &SessionOptions) -> Option<String> {
         None

@@ -2,6 +2,7 @@
 //! `plotplan send` draw on an emulated `ATmega328P`.
 
 mod arduino;
+mod arm;
 mod dc;
 mod micropython;
 mod rig;
@@ -21,6 +22,9 @@ const PACKAGES: &[(&str, &str)] = &[
     ("libelf-dev", "/usr/include/libelf.h"),
     ("arduino-core-avr", "/usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h"),
     ("libsimavr-dev", "/usr/include/simavr/sim_avr.h"),
+    ("gcc-arm-none-eabi", "/usr/bin/arm-none-eabi-gcc"),
+    ("libnewlib-arm-none-eabi", "/usr/include/newlib/stdio.h"),
+    ("qemu-system-arm", "/usr/bin/qemu-system-arm"),
 ];
 
 /// What is tested, with what, and the results so far.
@@ -100,6 +104,8 @@ pub(crate) fn run(filters: &[&str]) -> Result<bool> {
     bench.check("Arduino examples compile", arduino::examples);
     steppers::run(&mut bench);
     dc::run(&mut bench);
+    bench.check("ARM: portable layers on an emulated Cortex-M3", arm::unit_tests);
+    bench.check("ARM: zot on an emulated micro:bit, every step", arm::microbit);
     bench.check("MicroPython: protocol, loop and zot on simulated motors", micropython::tests);
     println!("{} passed, {} failed", bench.passed, bench.failed);
     Ok(bench.failed == 0)

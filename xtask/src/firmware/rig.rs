@@ -135,33 +135,7 @@ impl Rig {
 
     /// Sends a line with its checksum and returns the answer without its own.
     pub(super) fn ask(&self, text: &str) -> Result<String> {
-        let mut port =
-            std::fs::OpenOptions::new().read(true).write(true).custom_flags(O_NONBLOCK).open(&self.link)?;
-        let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
-        port.write_all(format!("{text}*{sum}\n").as_bytes())?;
-        // Answers to a sender that has ended may still come.
-        let kind = match text {
-            "where" => "at ",
-            "status" | "friction" => text,
-            _ => "",
-        };
-        let start = Instant::now();
-        let (mut line, mut byte) = (Vec::new(), [0]);
-        while start.elapsed() < ANSWER_LIMIT {
-            match port.read(&mut byte) {
-                Ok(1) if byte[0] == b'\n' => {
-                    let answer = String::from_utf8_lossy(&line).into_owned();
-                    if answer.starts_with(kind) {
-                        return Ok(answer.split('*').next().unwrap_or_default().to_owned());
-                    }
-                    line.clear();
-                }
-                Ok(1) => line.push(byte[0]),
-                Err(error) if error.kind() != std::io::ErrorKind::WouldBlock => return Err(error.into()),
-                _ => std::thread::sleep(Duration::from_millis(2)),
-            }
-        }
-        bail!("no answer to {text}")
+        ask_at(&self.link, text)
     }
 
     /// Asks until the answer is as wanted.
@@ -194,6 +168,36 @@ impl Drop for Rig {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Sends a line with its checksum and returns the answer without its own.
+pub(super) fn ask_at(port: &Path, text: &str) -> Result<String> {
+    let mut port = std::fs::OpenOptions::new().read(true).write(true).custom_flags(O_NONBLOCK).open(port)?;
+    let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
+    port.write_all(format!("{text}*{sum}\n").as_bytes())?;
+    // Answers to a sender that has ended may still come.
+    let kind = match text {
+        "where" => "at ",
+        "status" | "friction" => text,
+        _ => "",
+    };
+    let start = Instant::now();
+    let (mut line, mut byte) = (Vec::new(), [0]);
+    while start.elapsed() < ANSWER_LIMIT {
+        match port.read(&mut byte) {
+            Ok(1) if byte[0] == b'\n' => {
+                let answer = String::from_utf8_lossy(&line).into_owned();
+                if answer.starts_with(kind) {
+                    return Ok(answer.split('*').next().unwrap_or_default().to_owned());
+                }
+                line.clear();
+            }
+            Ok(1) => line.push(byte[0]),
+            Err(error) if error.kind() != std::io::ErrorKind::WouldBlock => return Err(error.into()),
+            _ => std::thread::sleep(Duration::from_millis(2)),
+        }
+    }
+    bail!("no answer to {text}")
 }
 
 /// Waits for a sender; kills one that hangs.

@@ -62,6 +62,8 @@ pub(super) struct Options {
     pub(super) pen_s: [f64; 2],
     /// Speed of travel with the pen up, mm/s.
     pub(super) travel_mm_s: f64,
+    /// The machine's own limit of that speed, infinite if it has none, mm/s.
+    pub(super) travel_limit_mm_s: f64,
     /// Chord error of curves that are neither lines nor circular arcs, mm.
     pub(super) chord_mm: f64,
 }
@@ -232,7 +234,7 @@ pub(super) fn xy(p: Point) -> String {
 }
 
 /// With at most `decimals` decimals, without trailing zeros or a negative 0.
-fn decimal(number: f64, decimals: usize) -> String {
+pub(super) fn decimal(number: f64, decimals: usize) -> String {
     let text = format!("{number:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
@@ -246,16 +248,22 @@ pub(super) fn pen(options: &Options, down: bool) -> Vec<Line> {
 }
 
 /// The lines that draw `drawing` (machine mm, in its order), then travel to `park`. `speeds_mm_s` has the speed of each
-/// stroke.
-pub(super) fn paths(drawing: &Drawing, speeds_mm_s: &[f64], park: Point, options: &Options) -> Vec<Line> {
+/// stroke. Without `pauses` it draws with one pen.
+pub(super) fn paths(
+    drawing: &Drawing,
+    speeds_mm_s: &[f64],
+    park: Point,
+    options: &Options,
+    pauses: bool,
+) -> Vec<Line> {
     let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
     program.start();
-    let mut pen = drawing.strokes.first().map(|stroke| stroke.pen);
+    let mut pen = drawing.strokes.first().map(|stroke| stroke.pen).filter(|_| pauses);
     if let Some(first) = pen.filter(|first| drawing.strokes.iter().any(|stroke| stroke.pen != *first)) {
         program.change_pen(first.0, None);
     }
     for (stroke, speed) in drawing.strokes.iter().zip(speeds_mm_s) {
-        if pen != Some(stroke.pen) {
+        if pauses && pen != Some(stroke.pen) {
             pen = Some(stroke.pen);
             program.change_pen(stroke.pen.0, Some(park));
         }
@@ -267,6 +275,16 @@ pub(super) fn paths(drawing: &Drawing, speeds_mm_s: &[f64], park: Point, options
         program.pen(false);
     }
     program.travel(park);
+    program.lines
+}
+
+/// The lines of one stroke, from the travel to its start.
+pub(super) fn stroke(stroke: &drawing::Stroke, options: &Options) -> Vec<Line> {
+    let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
+    program.travel(stroke.start());
+    for segment in stroke.segments() {
+        program.segment(&segment, 1.0);
+    }
     program.lines
 }
 
@@ -387,13 +405,9 @@ pub(super) fn write<W: Write + ?Sized>(lines: &[Line], out: &mut W) -> Result<()
     Ok(text.finish()?)
 }
 
-/// The mean speed of each stroke in a plan, mm/s: its length over the time that the pen is down and moves, at most
-/// `max_mm_s`. `rows` are those of a plan of `drawing`.
-pub(super) fn stroke_speeds_mm_s(
-    drawing: &Drawing,
-    rows: impl Iterator<Item = Row>,
-    max_mm_s: f64,
-) -> Vec<f64> {
+/// The time of each stroke in a plan, s: that during which the pen is down and moves. `rows` are those of a plan
+/// of as many strokes.
+pub(super) fn stroke_times_s(strokes: usize, rows: impl Iterator<Item = Row>) -> Vec<f64> {
     let mut times_us: Vec<u64> = Vec::new();
     let mut before: Option<Row> = None;
     let mut pen = 0;
@@ -411,9 +425,13 @@ pub(super) fn stroke_speeds_mm_s(
         pen = before.map_or(0, |last| last.pen);
         before = Some(row);
     }
-    let speed = |(index, stroke): (usize, &drawing::Stroke)| {
-        let seconds = times_us.get(index).map_or(0.0, |us| *us as f64 * 1e-6);
-        if seconds > 0.0 { (stroke.length() / seconds).clamp(0.1, max_mm_s) } else { max_mm_s }
+    (0..strokes).map(|index| times_us.get(index).map_or(0.0, |us| *us as f64 * 1e-6)).collect()
+}
+
+/// The mean speed of each stroke in these times, mm/s, at most `max_mm_s`.
+pub(super) fn stroke_speeds_mm_s(drawing: &Drawing, times_s: &[f64], max_mm_s: f64) -> Vec<f64> {
+    let speed = |(stroke, seconds): (&drawing::Stroke, &f64)| {
+        if *seconds > 0.0 { (stroke.length() / seconds).clamp(0.1, max_mm_s) } else { max_mm_s }
     };
-    drawing.strokes.iter().enumerate().map(speed).collect()
+    drawing.strokes.iter().zip(times_s).map(speed).collect()
 }

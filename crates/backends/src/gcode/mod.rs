@@ -3,6 +3,8 @@
 
 mod emulator;
 mod encode;
+mod grbl_feeds;
+mod grbl_time;
 mod homing;
 mod program;
 mod status;
@@ -25,6 +27,7 @@ use crate::transmission::character_counting::CharacterCounting;
 use crate::{Line, WriteError};
 
 pub(crate) use encode::Flavour;
+pub use grbl_time::{GrblSettings, duration_s as grbl_duration_s};
 pub use summary::{GcodeSummary, is_ours, summary};
 
 /// Chords of curves that G-code cannot express deviate by no more than this, mm.
@@ -67,6 +70,7 @@ fn options(
         } else {
             lift.max_speed_mm_s
         },
+        travel_limit_mm_s: lift.max_travel_speed_mm_s,
         chord_mm: CHORD_MM,
     })
 }
@@ -74,6 +78,26 @@ fn options(
 /// Lines and arcs of the drawing, with the mean speed of each stroke; the firmware plans accelerations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Paths(pub(crate) Flavour);
+
+impl Paths {
+    /// Feeds with which grbl keeps to the plan; `None` for other firmwares, whose planners are not modelled.
+    fn feeds(
+        self,
+        plan: &PlanSource<'_>,
+        encode: EncodeOptions,
+    ) -> Result<Option<grbl_feeds::Feeds>, crate::Unrepresentable> {
+        if self.0 != Flavour::Grbl {
+            return Ok(None);
+        }
+        let options = options(self.0, self.name(), plan, encode)?;
+        let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
+        let times_s = encode::stroke_times_s(drawing.strokes.len(), plan.rows());
+        let park = machine.mechanism().forward(&machine.start());
+        let plan_s = plan.header().duration_us as f64 * 1e-6;
+        let setpoints = plan.setpoints(self.name())?;
+        Ok(Some(grbl_feeds::find(machine, drawing, &times_s, setpoints, park, &options, plan_s)))
+    }
+}
 
 impl Backend for Paths {
     fn name(&self) -> &'static str {
@@ -128,11 +152,24 @@ impl Backend for Paths {
     ) -> Result<(), WriteError> {
         let options = options(self.0, self.name(), plan, *encode)?;
         let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
-        let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, plan.rows(), machine.pen().max_speed_mm_s);
         let park = machine.mechanism().forward(&machine.start());
+        let feeds = self.feeds(plan, *encode)?;
+        let speeds_mm_s = if let Some(feeds) = feeds {
+            writeln!(out, "; {}", feeds.times_line())?;
+            writeln!(out, "; {}", feeds.settings_line())?;
+            feeds.speeds_mm_s
+        } else {
+            let times_s = encode::stroke_times_s(drawing.strokes.len(), plan.rows());
+            encode::stroke_speeds_mm_s(drawing, &times_s, machine.pen().max_speed_mm_s)
+        };
         let mut lines = homing::lines(self.0, machine);
-        lines.extend(encode::paths(drawing, &speeds_mm_s, park, &options));
+        lines.extend(encode::paths(drawing, &speeds_mm_s, park, &options, true));
         encode::write(&lines, out)
+    }
+
+    fn remarks(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Vec<String> {
+        let Ok(Some(feeds)) = self.feeds(plan, *encode) else { return Vec::new() };
+        vec![feeds.times_line(), format!("with these settings: {}", feeds.settings_line())]
     }
 
     fn program(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Result<Program, ProgramError> {

@@ -195,8 +195,8 @@ fn plan(
     let ink = text::length(compiled.certificate.ink_mm);
     let written = Written { said, line: format!("{time}, {ink} of ink") };
     if let Format::Backend(backend) = format {
-        write_encoded(arguments, backend, &machine.machine, &compiled, to)?;
-        return Ok(written);
+        let remarks = write_encoded(arguments, backend, &machine.machine, &compiled, to)?;
+        return Ok(Written { said: written.said + &remarks, ..written });
     }
     let reading = &arguments.reading;
     let (layout, command_line) = of_part(job, part);
@@ -246,14 +246,15 @@ fn of_part(job: &Job<'_>, part: Part<'_>) -> (Layout, Vec<String>) {
     (layout, command_line)
 }
 
-/// Writes the plan in a firmware's format, and warns of what the format cannot carry.
+/// Writes the plan in a firmware's format, and warns of what the format cannot carry. Returns lines for
+/// the report.
 fn write_encoded(
     arguments: &Convert,
     backend: &dyn Backend,
     machine: &Machine,
     compiled: &Compiled<'_>,
     to: &str,
-) -> Result<(), Failure> {
+) -> Result<String, Failure> {
     backend.check(machine).map_err(|error| Failure::Drawing(error.into()))?;
     let pens: Vec<u16> = compiled.ordered().pens().into_iter().map(|pen| pen.0).collect();
     let losses: Vec<Loss> =
@@ -277,12 +278,13 @@ fn write_encoded(
             }
         })
     });
-    match refused {
-        Some(error) => {
-            Err(Failure::Drawing(anyhow::Error::new(error).context("this format cannot represent the plan")))
-        }
-        None => written,
+    if let Some(error) = refused {
+        let error = anyhow::Error::new(error).context("this format cannot represent the plan");
+        return Err(Failure::Drawing(error));
     }
+    written?;
+    let remarks = backend.remarks(&source, &arguments.pen.encode_options());
+    Ok(remarks.into_iter().map(|remark| remark + "\n").collect())
 }
 
 /// Compiles with progress, and explains where it cannot be done.
