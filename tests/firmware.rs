@@ -784,7 +784,8 @@ fn formats_page_lists_every_format() {
 /// Both durations that `convert` reports; the settings are those of the file.
 #[test]
 fn grbl_keeps_to_the_plan() {
-    let one_pen = ["examples/zot.hpgl", "examples/house.hpgl", "tests/drawings/spiral.hpgl", "examples/rosette.hpgl"];
+    let one_pen =
+        ["examples/zot.hpgl", "examples/house.hpgl", "tests/drawings/spiral.hpgl", "examples/rosette.hpgl"];
     for machine in ["cartesian", "corexy", "coaxial"] {
         for file in one_pen {
             let text = convert(file, machine, "gcode-grbl", &[]);

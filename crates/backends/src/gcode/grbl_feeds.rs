@@ -86,7 +86,9 @@ pub(super) fn find(
     }
     let strokes = drawing.strokes.iter().zip(times_s);
     let mut speeds_mm_s: Vec<f64> = strokes
-        .map(|(stroke, time_s)| stroke_speed_mm_s(&encode::stroke(stroke, options), *time_s, most_mm_s, &settings))
+        .map(|(stroke, time_s)| {
+            stroke_speed_mm_s(&encode::stroke(stroke, options), *time_s, most_mm_s, &settings)
+        })
         .collect();
     let mut grbl_s = duration_s(&settings, &speeds_mm_s);
     if grbl_s > plan_s * (1.0 + MARGIN) {
@@ -178,7 +180,8 @@ fn settings_of(machine: &Machine, options: &Options) -> GrblSettings {
     let mut settings = settings_without_limits(options);
     for axis in 0..2 {
         settings.steps_per_mm[axis] = most_ticks(axis);
-        settings.max_rate_mm_s[axis] = least(axis, |motor| motor.max_speed_ticks_s).min(options.travel_limit_mm_s);
+        settings.max_rate_mm_s[axis] =
+            least(axis, |motor| motor.max_speed_ticks_s).min(options.travel_limit_mm_s);
         settings.acceleration_mm_s2[axis] = least(axis, |motor| motor.max_acceleration_ticks_s2);
     }
     settings
@@ -197,21 +200,19 @@ fn settings_from_plan(setpoints: impl Iterator<Item = Setpoint>, options: &Optio
             let dt = (setpoint.row.t_us - from.row.t_us) as f64 * 1e-6;
             let way = setpoint.at - from.at;
             let speed = [way.x / dt, way.y / dt];
-            for axis in 0..2 {
-                speed_mm_s[axis] = speed_mm_s[axis].max(speed[axis].abs());
-                if let Some((last_dt, last)) = last {
+            speed_mm_s = [0, 1].map(|axis: usize| speed_mm_s[axis].max(speed[axis].abs()));
+            if let Some((last_dt, last)) = last {
+                acceleration_mm_s2 = [0, 1].map(|axis: usize| {
                     let change = (speed[axis] - last[axis]).abs() / (0.5 * (dt + last_dt));
-                    acceleration_mm_s2[axis] = acceleration_mm_s2[axis].max(change);
-                }
+                    acceleration_mm_s2[axis].max(change)
+                });
             }
             last = Some((dt, speed));
         }
         before = Some(setpoint);
     }
-    for axis in 0..2 {
-        settings.max_rate_mm_s[axis] = speed_mm_s[axis].max(1.0).ceil();
-        settings.acceleration_mm_s2[axis] = acceleration_mm_s2[axis].max(1.0).ceil();
-    }
+    settings.max_rate_mm_s[..2].copy_from_slice(&speed_mm_s.map(|speed| speed.max(1.0).ceil()));
+    settings.acceleration_mm_s2[..2].copy_from_slice(&acceleration_mm_s2.map(|value| value.max(1.0).ceil()));
     settings
 }
 

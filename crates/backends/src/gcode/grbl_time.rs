@@ -293,9 +293,9 @@ impl<'a> Model<'a> {
         let length = distance([0.0; 3], delta);
         let direction = delta.map(|part| part / length);
         let limit = |limits: &[f64; 3], direction: &[f64; 3]| {
-            (0..3).filter(|axis| direction[*axis] != 0.0).fold(f64::INFINITY, |least, axis| {
-                least.min(limits[axis] / direction[axis].abs())
-            })
+            (0..3)
+                .filter(|axis| direction[*axis] != 0.0)
+                .fold(f64::INFINITY, |least, axis| least.min(limits[axis] / direction[axis].abs()))
         };
         let rapid = limit(&self.settings.max_rate_mm_s, &direction);
         let nominal = feed_mm_s.map_or(rapid, |feed| feed.min(rapid)).max(1.0 / 60.0);
@@ -313,7 +313,9 @@ impl<'a> Model<'a> {
                 let turn: [f64; 3] = [0, 1, 2].map(|axis: usize| direction[axis] - before[axis]);
                 let turn = turn.map(|part| part / distance([0.0; 3], turn));
                 let sin_half = libm::sqrt(0.5 * (1.0 - cos));
-                limit(&self.settings.acceleration_mm_s2, &turn) * self.settings.junction_deviation_mm * sin_half
+                limit(&self.settings.acceleration_mm_s2, &turn)
+                    * self.settings.junction_deviation_mm
+                    * sin_half
                     / (1.0 - sin_half)
             };
             let slower = nominal.min(self.nominal_before);
