@@ -63,7 +63,7 @@ fn placed(file: &str, plan: &TickTable) -> Drawing {
 }
 
 /// The drawing with pen 1 only, for formats without pen numbers.
-fn with_files(mut drawing: Drawing) -> Drawing {
+fn with_one_pen(mut drawing: Drawing) -> Drawing {
     for stroke in &mut drawing.strokes {
         stroke.pen = drawing::Pen(1);
     }
@@ -317,7 +317,7 @@ fn xy_serial_ink() {
     let machine = preset("hbot");
     for file in DRAWINGS {
         let plan = plan(file, "hbot", &[]);
-        let drawing = with_files(placed(file, &plan));
+        let drawing = with_one_pen(placed(file, &plan));
         let lines = convert(file, "hbot", "xy-serial", &[]);
         for first in [None, Some(0), Some(1)] {
             let certificate = measure(&machine, &drawing, &single_belt_ink(&lines, first), 1.0);
@@ -495,7 +495,7 @@ fn gcode_ink_with_arcs() {
     let ruler = ruler(Cartesian);
     for file in DRAWINGS {
         let plan = plan(file, "cartesian", &[]);
-        let drawing = with_files(placed(file, &plan));
+        let drawing = with_one_pen(placed(file, &plan));
         for format in ["gcode-grbl", "gcode-fluidnc", "gcode-marlin", "gcode-klipper"] {
             for pen in [&[][..], &["--pen-by", "z"], &["--pen-by", "servo", "--pen-positions", "10,70"]] {
                 let text = convert(file, "cartesian", format, pen);
@@ -520,7 +520,7 @@ fn gcode_timed_ink_and_duration() {
     for machine in ["cartesian", "coaxial", "polar"] {
         let file = DRAWINGS[0];
         let plan = plan(file, machine, &[]);
-        let drawing = with_files(placed(file, &plan));
+        let drawing = with_one_pen(placed(file, &plan));
         let text = convert(file, machine, "gcode-timed", &[]);
         let ink = feed(&mut *emulator("gcode-grbl"), &text, '\n').lines();
         within(machine, &measure(&ruler, &drawing, &ink, FINE), &drawing, TOLERANCE + 0.01);
@@ -630,7 +630,7 @@ fn joint_trajectory_quintic_ink() {
     for name in ["coaxial", "polar", "corexy"] {
         let machine = preset(name);
         let plan = plan(DRAWINGS[0], name, &[]);
-        let drawing = with_files(placed(DRAWINGS[0], &plan));
+        let drawing = with_one_pen(placed(DRAWINGS[0], &plan));
         let text = convert(DRAWINGS[0], name, "joint-trajectory", &[]);
         let document: Value = serde_json::from_str(&text).expect("JSON");
         assert_eq!(document["joint_names"][2], "pen");
@@ -692,7 +692,7 @@ fn halstreamer_and_pvt_ink() {
         for period in ["1ms", "10ms"] {
             let options = ["--period", period];
             let plan = plan(DRAWINGS[0], name, &options);
-            let drawing = with_files(placed(DRAWINGS[0], &plan));
+            let drawing = with_one_pen(placed(DRAWINGS[0], &plan));
             let columns = convert(DRAWINGS[0], name, "halstreamer", &options);
             assert_eq!(columns.lines().count() as u64, plan.header.duration_us / plan.header.period_us + 1);
             let samples = columns.lines().map(|line| {
