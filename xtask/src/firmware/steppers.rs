@@ -193,17 +193,10 @@ fn chip_reset(bench: &Bench, event: &str) -> Result<String> {
         _ => "start",
     };
     ensure!(status.contains(cause), "{status}");
-    if event == "power" {
-        // The same plan once more, from its start: the motors were put back.
-        rig.draw(bench, &plan)?;
-        let [a, b] = Steps::read(&plan)?.end;
-        rig.ask_until("where", |answer| answer == format!("at {a} {b} 0"))?;
-    }
     let (_, trace) = rig.finish()?;
     let pen = trace.pens.last().context("no pen")?.1;
     ensure!((pen - PEN_UP_US).abs() < 4.0, "the pen is at {pen} us");
-    let again = if event == "power" { ", then the plan drawn again to its end" } else { "" };
-    Ok(format!("send stops, pen up, `{place}`, `{status}`{again}"))
+    Ok(format!("send stops, pen up, `{place}`, `{status}`"))
 }
 
 fn interrupted(bench: &Bench) -> Result<String> {
