@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, ensure};
 
 use super::Bench;
 use super::rig::{Rig, signal, wait};
-use super::trace::{Jitter, Steps, compare, compare_order};
+use super::trace::{Jitter, Steps, Trace, compare, compare_order};
 
 const IMAGE: &str = "uno-steps";
 /// Pulse of the lowered pen, us, as in `app/steps.h`.
