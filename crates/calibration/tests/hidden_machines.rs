@@ -337,8 +337,8 @@ fn touches_from_both_sides(hidden: &Setup, random: &mut Random) -> Vec<Touch> {
         let mut all = touches(hidden, &places, random);
         for touch in &mut all {
             touch.approach = *approach;
-            for motor in 0..2 {
-                touch.ticks[motor] += (0.5 * approach[motor] * hidden.backlash_ticks[motor]).round();
+            for (motor, side) in approach.iter().enumerate() {
+                touch.ticks[motor] += (0.5 * side * hidden.backlash_ticks[motor]).round();
             }
         }
         all

@@ -46,7 +46,11 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-fn sketches() -> Vec<Sketch> {
+fn sketches() -> impl Iterator<Item = Sketch> {
+    open_chains().into_iter().chain(closed_chains())
+}
+
+fn open_chains() -> Vec<Sketch> {
     use Note::{Angle, At, Between, Way};
     let at = Point::new;
     vec![
@@ -89,6 +93,13 @@ fn sketches() -> Vec<Sketch> {
                 Angle(1, 2, 44.0, "φ"),
             ],
         },
+    ]
+}
+
+fn closed_chains() -> Vec<Sketch> {
+    use Note::{Angle, At, Between};
+    let at = Point::new;
+    vec![
         Sketch {
             name: "five-bar",
             mechanism: Box::new(FiveBar {
