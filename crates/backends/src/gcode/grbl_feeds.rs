@@ -35,8 +35,8 @@ pub(super) struct Feeds {
 }
 
 impl Feeds {
-    /// `$1=255 $11=0.1 ...`
-    pub(super) fn settings_line(&self) -> String {
+    /// `$1=255 $11=0.1 ...`, in lines of less than 80 characters.
+    pub(super) fn settings(&self) -> [String; 2] {
         let GrblSettings { steps_per_mm, max_rate_mm_s, acceleration_mm_s2, .. } = &self.settings;
         let number = |value: f64| encode::decimal(value, 3);
         let mut words = vec![
@@ -47,9 +47,10 @@ impl Feeds {
         if self.is_linear {
             words.extend((0..2).map(|axis| format!("$10{axis}={}", number(steps_per_mm[axis]))));
         }
-        words.extend((0..2).map(|axis| format!("$11{axis}={}", number(max_rate_mm_s[axis] * 60.0))));
-        words.extend((0..2).map(|axis| format!("$12{axis}={}", number(acceleration_mm_s2[axis]))));
-        words.join(" ")
+        let rates = (0..2).map(|axis| format!("$11{axis}={}", number(max_rate_mm_s[axis] * 60.0)));
+        let accelerations = (0..2).map(|axis| format!("$12{axis}={}", number(acceleration_mm_s2[axis])));
+        let limits: Vec<String> = rates.chain(accelerations).collect();
+        [words.join(" "), limits.join(" ")]
     }
 
     /// Both durations.

@@ -156,7 +156,9 @@ impl Backend for Paths {
         let feeds = self.feeds(plan, *encode)?;
         let speeds_mm_s = if let Some(feeds) = feeds {
             writeln!(out, "; {}", feeds.times_line())?;
-            writeln!(out, "; {}", feeds.settings_line())?;
+            for settings in feeds.settings() {
+                writeln!(out, "; {settings}")?;
+            }
             feeds.speeds_mm_s
         } else {
             let times_s = encode::stroke_times_s(drawing.strokes.len(), plan.rows());
@@ -169,7 +171,7 @@ impl Backend for Paths {
 
     fn remarks(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Vec<String> {
         let Ok(Some(feeds)) = self.feeds(plan, *encode) else { return Vec::new() };
-        vec![feeds.times_line(), format!("with these settings: {}", feeds.settings_line())]
+        vec![feeds.times_line(), format!("with these settings: {}", feeds.settings().join(" "))]
     }
 
     fn program(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Result<Program, ProgramError> {

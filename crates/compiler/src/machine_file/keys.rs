@@ -236,7 +236,9 @@ mod tests {
         let of = resolved(of, root);
         match value {
             Value::Object(table) => table.iter().find_map(|(key, value)| {
-                let known = of["properties"].get(key).or_else(|| of.get("additionalProperties"));
+                // `false` where other keys are refused.
+                let others = of.get("additionalProperties").filter(|others| others.is_object());
+                let known = of["properties"].get(key).or(others);
                 match known {
                     Some(known) => unknown(value, known, root),
                     None => Some(key.clone()),
