@@ -18,7 +18,6 @@ fuzz_target!(|bytes: &[u8]| {
     let setups = common::backends();
     let setup = setups[usize::from(*which) % setups.len()];
     let program = setup.program(&common::small());
-    let lines = program.lines.len() as u64;
     let mut session = setup.session(program);
     let mut now_us = 0;
     let mut sent = 0;
@@ -40,7 +39,8 @@ fuzz_target!(|bytes: &[u8]| {
     let progress = session.progress();
     assert!(progress.lines <= progress.of_lines);
     if session.outcome() == Some(&Outcome::Done) {
-        assert!(!progress.acknowledged || progress.lines == lines.min(progress.of_lines), "{progress:?}");
+        // A session may add lines: xy-serial goes to the middle first.
+        assert!(!progress.acknowledged || progress.lines == progress.of_lines, "{progress:?}");
     }
     // A line is sent again after an answer or a time-out, so a bounded number of times for each piece.
     assert!(sent < 100_000 + 20_000 * bytes.len(), "{sent} bytes for {} bytes", bytes.len());
