@@ -4,6 +4,8 @@
 //! run is measured: from the ink to the drawing ([`crate::near`]), and from the drawing to the ink
 //! ([`crate::cover`]). In crowded drawings only followed strokes are examined ([`crate::follow`]).
 
+use std::collections::VecDeque;
+
 use drawing::{Point, Rect, distance};
 
 use crate::{
@@ -156,11 +158,13 @@ impl Trace {
         let bounds = Rect::from_points(run.from, run.to).inflate(self.radius, self.radius);
         let following = self.follower.advance(strokes, &run, bounds, self.radius, &mut self.candidates);
         let mut scope = if following { Scope::Followed } else { self.examine(target, &run, bounds) };
+        let mut passed = VecDeque::new();
         loop {
             if scope != Scope::Followed {
                 // Strokes that the runs before this one covered in passing, while following.
-                for (run, before) in self.follower.take_recent() {
-                    self.cover_all(strokes, &run, before.as_ref());
+                passed.extend(self.follower.take_recent());
+                for (run, before) in &passed {
+                    self.cover_all(strokes, run, before.as_ref());
                 }
             }
             self.cover_all(strokes, &run, before.as_ref());
