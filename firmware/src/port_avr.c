@@ -8,6 +8,7 @@
 #include <stddef.h>
 
 #include "machine.h"
+#include "port_receive.h"
 
 #ifndef F_CPU
 #define F_CPU 16000000UL
@@ -23,8 +24,6 @@
 #define SERVO_START_US 200
 #define SERVO_LATER_START_US 600
 
-static volatile uint8_t receive[PLOTPLAN_RECEIVE];
-static volatile uint8_t receive_head, receive_tail;
 static bool dc_limits;
 static volatile uint16_t pulse_us;
 static uint8_t reset_flags __attribute__((section(".noinit")));
@@ -66,21 +65,7 @@ void port_unlock(uint8_t state) {
 }
 
 ISR(UART_RECEIVE_VECTOR) {
-    uint8_t byte = UDR0, head = receive_head, next = (head + 1) & (PLOTPLAN_RECEIVE - 1);
-    /* A full buffer drops the byte; the line's checksum shows it. */
-    if (next != receive_tail) {
-        receive[head] = byte;
-        receive_head = next;
-    }
-}
-
-int16_t port_peek(void) {
-    uint8_t tail = receive_tail;
-    return tail == receive_head ? -1 : receive[tail];
-}
-
-void port_drop(void) {
-    receive_tail = (receive_tail + 1) & (PLOTPLAN_RECEIVE - 1);
+    port_received(UDR0);
 }
 
 bool port_send(uint8_t byte) {

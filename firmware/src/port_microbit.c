@@ -4,6 +4,7 @@
 #include "port_microbit.h"
 
 #include "machine.h"
+#include "port_receive.h"
 
 #define CLOCK 0x40000000u
 #define UART 0x40002000u
@@ -20,8 +21,6 @@
 #define PIN_RX 25
 #define SERVO_PERIOD_MS 20
 
-static volatile uint8_t receive[PLOTPLAN_RECEIVE];
-static volatile uint8_t receive_head, receive_tail;
 static volatile uint16_t pulse_us;
 static bool transmits;
 
@@ -116,21 +115,7 @@ void port_unlock(uint8_t state) {
 
 static void uart_interrupt(void) {
     REGISTER(UART + 0x108) = 0;
-    uint8_t byte = (uint8_t)REGISTER(UART + 0x518), head = receive_head;
-    uint8_t next = (head + 1) & (PLOTPLAN_RECEIVE - 1);
-    if (next != receive_tail) {
-        receive[head] = byte;
-        receive_head = next;
-    }
-}
-
-int16_t port_peek(void) {
-    uint8_t tail = receive_tail;
-    return tail == receive_head ? -1 : receive[tail];
-}
-
-void port_drop(void) {
-    receive_tail = (receive_tail + 1) & (PLOTPLAN_RECEIVE - 1);
+    port_received((uint8_t)REGISTER(UART + 0x518));
 }
 
 bool port_send(uint8_t byte) {
