@@ -24,14 +24,16 @@ const TARGETS: &[Target] = &[
     Target { triple: "aarch64-apple-darwin", by_rust: false, windows: false },
 ];
 
-/// Runs on the machine that builds: man pages and completions are printed by it.
+/// Runs on the machine that builds, and is in the Debian package and the wheel too: man pages and completions
+/// are printed by it.
 pub(crate) const NATIVE: &str = "x86_64-unknown-linux-musl";
-/// The Debian package and the wheel contain this one too.
+/// The folder that `cargo xtask web` makes.
+const STUDIO: &str = "target/studio";
 const MAINTAINER: &str = "The plotplan maintainers <plotplan@users.noreply.example>";
 const FILES: &[&str] = &["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"];
 
-/// Builds what is named, or everything but the studio's files, which are given by their folder. With
-/// `--program FILE`, that program is packed instead of building the native one.
+/// Builds what is named, or everything. With `--program FILE`, that program is packed instead of building the
+/// native one; `--studio FOLDER` packs a studio that is built already.
 pub(crate) fn run(words: &[&str]) -> Result<bool> {
     let mut targets: Vec<&Target> = Vec::new();
     let (mut deb, mut wheel, mut studio, mut program) = (false, false, None, None);
@@ -49,7 +51,7 @@ pub(crate) fn run(words: &[&str]) -> Result<bool> {
         }
     }
     if words.is_empty() {
-        (deb, wheel) = (true, true);
+        (deb, wheel, studio) = (true, true, Some(&STUDIO));
         targets.extend(TARGETS);
     }
     let out = crate::top().join("target/dist");
@@ -77,7 +79,7 @@ pub(crate) fn run(words: &[&str]) -> Result<bool> {
         build_wheel(&out)?;
     }
     if let Some(folder) = studio {
-        println!("{}", studio_archive(Path::new(folder), &out)?.display());
+        println!("{}", studio_archive(&crate::top().join(folder), &out)?.display());
     }
     checksums(&out)?;
     for failure in &failed {
@@ -98,7 +100,7 @@ pub(crate) fn build(triple: &str) -> Result<PathBuf> {
     let mut command = Command::new("cargo");
     command.arg(if target.by_rust { "build" } else { "zigbuild" });
     command.args(["--release", "--locked", "-p", "plotplan", "--target", target.triple]);
-    command.env("PLOTPLAN_STUDIO", "target/studio");
+    command.env("PLOTPLAN_STUDIO", STUDIO);
     // Pure Rust: its own linker is enough.
     command.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld");
     execute(&mut command)
@@ -230,8 +232,11 @@ fn debian(program: &Path, extras: &Path, out: &Path) -> Result<PathBuf> {
 
 /// The wheel: the static program, so that one file serves every Linux on x86-64.
 fn build_wheel(out: &Path) -> Result<()> {
+    crate::web::build()?;
     let mut command = Command::new("maturin");
     command.args(["build", "--release", "--locked", "--target", NATIVE]);
+    // As in `build`: the same program as in the archive.
+    command.env("PLOTPLAN_STUDIO", STUDIO);
     command
         .args(["--compatibility", "manylinux2014", "--auditwheel", "skip", "--out"])
         .arg(std::path::absolute(out)?);

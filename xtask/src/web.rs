@@ -1,5 +1,6 @@
 //! The studio as static files: the compiler as WebAssembly, the page, the viewer's modules.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -30,7 +31,8 @@ pub(crate) fn run() -> Result<bool> {
     Ok(true)
 }
 
-/// Builds the studio; returns its folder.
+/// Builds the studio; returns its folder. Files that are as they should be keep their time, so that Cargo
+/// builds the program again only where the studio has changed.
 pub(crate) fn build() -> Result<PathBuf> {
     let top = std::path::absolute(crate::top())?;
     crate::ci::add_target(TARGET)?;
@@ -39,26 +41,34 @@ pub(crate) fn build() -> Result<PathBuf> {
     let status = cargo.current_dir(&top).status().context("cannot run cargo")?;
     ensure!(status.success(), "cargo build for {TARGET}: {status}");
     let folder = top.join("target/studio");
-    if folder.exists() {
-        std::fs::remove_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
-    }
+    std::fs::create_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
+    let mut made = BTreeSet::new();
+    let mut make = |to: PathBuf, bytes: Vec<u8>| -> Result<()> {
+        if std::fs::read(&to).ok().as_ref() != Some(&bytes) {
+            crate::programs::write(&to, bytes)?;
+        }
+        made.insert(to);
+        Ok(())
+    };
+    let read = |path: &Path| std::fs::read(path).with_context(|| format!("{}", path.display()));
     for (from, to, extensions) in FOLDERS {
         let to = folder.join(to);
-        std::fs::create_dir_all(&to)?;
         for entry in std::fs::read_dir(top.join(from)).with_context(|| (*from).to_owned())? {
             let path = entry?.path();
             let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
             if extensions.contains(&extension) {
-                copy(&path, &to.join(path.file_name().context("a file without a name")?))?;
+                make(to.join(path.file_name().context("a file without a name")?), read(&path)?)?;
             }
         }
     }
-    std::fs::create_dir_all(folder.join("examples"))?;
-    copy(&top.join("examples/house.hpgl"), &folder.join("examples/house.hpgl"))?;
+    make(folder.join("examples/house.hpgl"), read(&top.join("examples/house.hpgl"))?)?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| top.join("target"), PathBuf::from);
     let wasm = target.join(TARGET).join("web/studio_wasm.wasm");
-    copy(&wasm, &folder.join("studio.wasm"))?;
-    std::fs::write(folder.join("index.html"), page(&top)?)?;
+    make(folder.join("studio.wasm"), read(&wasm)?)?;
+    make(folder.join("index.html"), page(&top)?.into_bytes())?;
+    for file in files_below(&folder)?.iter().filter(|file| !made.contains(*file)) {
+        std::fs::remove_file(file).with_context(|| format!("{}", file.display()))?;
+    }
     Ok(folder)
 }
 
@@ -73,11 +83,6 @@ fn page(top: &Path) -> Result<String> {
         "the page has another form"
     );
     Ok(page.replace(marker, &viewer.replace(header, &format!("{header}{setup}"))))
-}
-
-fn copy(from: &Path, to: &Path) -> Result<()> {
-    std::fs::copy(from, to).with_context(|| format!("{}", from.display()))?;
-    Ok(())
 }
 
 /// All files below a folder.
