@@ -64,9 +64,7 @@ fn placed(file: &str, plan: &TickTable) -> Drawing {
 
 /// The drawing with pen 1 only, for formats without pen numbers.
 fn with_one_pen(mut drawing: Drawing) -> Drawing {
-    for stroke in &mut drawing.strokes {
-        stroke.pen = drawing::Pen(1);
-    }
+    drawing.strokes.change_pens(|_| Some(drawing::Pen(1)));
     drawing
 }
 

@@ -85,7 +85,7 @@ fn drawing() -> Drawing {
     let mut stroke = Stroke::new(Pen(1), Point::new(0.0, 0.0), Span::default());
     stroke.line_to(Point::new(20.0, 0.0));
     stroke.arc(EllipticArc::circular(Point::new(10.0, 0.0), 10.0, 0.0, 1.5 * std::f64::consts::PI));
-    Drawing { strokes: vec![stroke] }
+    Drawing::from(vec![stroke])
 }
 
 fn write(

@@ -111,7 +111,7 @@ proptest! {
         prop_assert_eq!(drawing.strokes.len(), back.strokes.len());
         for (wanted, drawn) in drawing.strokes.iter().zip(&back.strokes) {
             prop_assert_eq!(wanted.pen, drawn.pen);
-            let off = deviation(wanted, drawn) / sheet.plotter.unit_mm;
+            let off = deviation(&wanted, &drawn) / sheet.plotter.unit_mm;
             let what = || format!("{} {} {:?} {:?}", sheet.plotter.name, sheet.paper.name, wanted, drawn);
             prop_assert!(off <= 1.0, "{} units off: {}", off, what());
         }
@@ -151,7 +151,7 @@ fn ink_off_the_paper_and_missing_pens_are_refused() {
     let sheet = Sheet::named(plotter, Some("a4")).unwrap();
     let area = sheet.area_mm();
     let at = |x: f64, y: f64, pen: u16| Drawing {
-        strokes: vec![Stroke::new(Pen(pen), Point::new(x, y), Span::default())],
+        strokes: vec![Stroke::new(Pen(pen), Point::new(x, y), Span::default())].into(),
     };
     // The corners themselves are reached.
     assert!(encode(&at(0.0, 0.0, 1), &sheet).is_ok());
@@ -167,7 +167,7 @@ fn ink_off_the_paper_and_missing_pens_are_refused() {
     let mut stroke = Stroke::new(Pen(1), Point::new(20.0, 5.0), Span::default());
     stroke.arc(EllipticArc::circular(Point::new(10.0, 5.0), 10.0, 0.0, PI));
     stroke.transform(Affine::rotate_about(PI, Point::new(15.0, 5.0)));
-    assert!(matches!(encode(&Drawing { strokes: vec![stroke] }, &sheet), Err(PlotterLimit::OffPaper { .. })));
+    assert!(matches!(encode(&Drawing::from(vec![stroke]), &sheet), Err(PlotterLimit::OffPaper { .. })));
 }
 
 fn backend() -> &'static dyn Backend {
@@ -209,7 +209,9 @@ fn failure(outcome: Option<Outcome>) -> String {
 fn job() -> (Drawing, Sheet<'static>, Program) {
     let sheet = Sheet::named(Plotter::named("hp7475a").unwrap(), Some("a4")).unwrap();
     let mut drawing = random_drawing(11, &sheet, 14);
-    drawing.strokes.sort_by_key(|stroke| stroke.pen);
+    let mut strokes = drawing.strokes.to_vec();
+    strokes.sort_by_key(|stroke| stroke.pen);
+    drawing.strokes = strokes.into();
     let program = backend().parse_program(&text(&drawing, &sheet)).unwrap();
     (drawing, sheet, program)
 }
@@ -280,7 +282,7 @@ fn stopped_at_a_stroke_and_resumed() {
         let rest = program.from_row(row, None).unwrap();
         let (outcome, machine, _) = send(&rest, &SessionOptions::default(), Vec::new(), None);
         assert_eq!(outcome, Some(Outcome::Done), "{what}");
-        let rest = Drawing { strokes: drawing.strokes[row as usize..].to_vec() };
+        let rest = Drawing { strokes: drawing.strokes.iter().skip(row as usize).collect() };
         assert_drawn(&machine, &rest, &sheet, &what);
     }
     assert!(cut < 19, "all strokes are cut");
@@ -338,7 +340,7 @@ fn resumed_file_restores_pen_speed_scaling_and_position() {
         let texts: Vec<&str> = rest.lines.iter().map(|line| line.text.as_str()).collect();
         let back = read_units(&rest);
         assert_eq!(back.strokes.len(), 4 - row as usize, "{texts:?}");
-        for (wanted, drawn) in whole.strokes[row as usize..].iter().zip(&back.strokes) {
+        for (wanted, drawn) in whole.strokes.iter().skip(row as usize).zip(&back.strokes) {
             assert_eq!(
                 (wanted.pen, wanted.start(), wanted.end()),
                 (drawn.pen, drawn.start(), drawn.end()),

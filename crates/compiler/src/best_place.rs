@@ -105,12 +105,12 @@ impl Samples {
     fn of(drawing: &Drawing) -> Self {
         let mut samples = Self::default();
         let step = drawing.length() / SAMPLES;
-        let segments: usize = drawing.strokes.iter().map(Stroke::segment_count).sum();
+        let segments: usize = drawing.strokes.iter().map(|stroke| stroke.segment_count()).sum();
         let stride = (segments as f64 / SAMPLES).ceil().max(1.0) as usize;
         let (mut due, mut number) = (0.5 * step, 0_usize);
-        for segments in drawing.strokes.iter().map(Stroke::segments) {
+        for stroke in &drawing.strokes {
             let mut before: Option<Vec2> = None;
-            for segment in segments {
+            for segment in stroke.segments() {
                 let length = segment.length();
                 let direction = |t: f64| {
                     let (a, b) = (segment.eval((t - 1e-3).max(0.0)), segment.eval((t + 1e-3).min(1.0)));
@@ -135,13 +135,13 @@ impl Samples {
         }
         if samples.ink.is_empty() {
             let direction = Vec2::new(1.0, 0.0);
-            let dot = |stroke: &Stroke| Ink { point: stroke.start(), direction, length: 1.0 };
+            let dot = |stroke: Stroke| Ink { point: stroke.start(), direction, length: 1.0 };
             samples.ink = drawing.strokes.iter().map(dot).collect();
         }
-        let pairs = drawing.strokes.windows(2);
+        let pairs = drawing.strokes.iter().zip(drawing.strokes.iter().skip(1));
         let stride = (pairs.len() as f64 / SAMPLES).ceil().max(1.0) as usize;
         let travel =
-            |pair: &[Stroke]| Travel { ends: [pair[0].end(), pair[1].start()], count: stride as f64 };
+            |(one, next): (Stroke, Stroke)| Travel { ends: [one.end(), next.start()], count: stride as f64 };
         samples.travels = pairs.step_by(stride).map(travel).collect();
         samples
     }

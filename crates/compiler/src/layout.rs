@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use drawing::{Affine, Drawing, Pen, Rect, Side, Span, Vec2};
+use drawing::{Affine, Drawing, Pen, Rect, Side, Vec2};
 use serde::Serialize;
 
 use crate::import::{Page, PenSettings};
@@ -78,15 +78,13 @@ impl Layout {
     /// lowest number, with the least speed of all.
     pub fn apply_pens(&self, page: &mut Page) {
         if let Some(only) = &self.only_pens {
-            page.drawing.strokes.retain(|stroke| only.contains(&stroke.pen.0));
+            page.drawing.strokes.change_pens(|pen| only.contains(&pen.0).then_some(pen));
             page.pens.retain(|pen, _| only.contains(&pen.0));
         }
         if self.pen_map.is_empty() {
             return;
         }
-        for stroke in &mut page.drawing.strokes {
-            stroke.pen = self.mapped(stroke.pen);
-        }
+        page.drawing.strokes.change_pens(|pen| Some(self.mapped(pen)));
         let mut pens = BTreeMap::new();
         for (pen, settings) in std::mem::take(&mut page.pens) {
             add_settings(&mut pens, self.mapped(pen), settings);
@@ -132,10 +130,9 @@ impl Layout {
                     continue;
                 }
                 let shift = Vec2::new(pitch.x * f64::from(column), pitch.y * f64::from(row));
-                drawing.strokes.extend(one.iter().cloned().map(|mut stroke| {
-                    stroke.transform(Affine::translate(shift));
-                    stroke
-                }));
+                let mut copy = one.clone();
+                copy.transform(Affine::translate(shift));
+                drawing.strokes.append(copy);
             }
         }
     }
@@ -195,7 +192,7 @@ pub fn number_colors_together(pages: &mut [Page], by_color: &[bool]) {
     let mut color_of: BTreeMap<Pen, [u8; 3]> = BTreeMap::new();
     let mut fixed: BTreeSet<Pen> = BTreeSet::new();
     for (page, _) in pages.iter().zip(by_color).filter(|(_, by_color)| !**by_color) {
-        fixed.extend(page.drawing.strokes.iter().map(|stroke| stroke.pen));
+        fixed.extend(page.drawing.pens());
         for (&pen, settings) in &page.pens {
             color_of
                 .extend(settings.color.filter(|_| !color_of.contains_key(&pen)).map(|color| (pen, color)));
@@ -233,11 +230,9 @@ pub fn overlay(pages: Vec<(Page, usize)>) -> (Page, Vec<ColorConflict>) {
     let mut conflicts = Vec::new();
     let mut offset = 0;
     for (index, (page, length)) in pages.into_iter().enumerate() {
-        all.drawing.strokes.extend(page.drawing.strokes.into_iter().map(|mut stroke| {
-            let Span { start, end } = stroke.source();
-            stroke.set_source(Span { start: start + offset, end: end + offset });
-            stroke
-        }));
+        let mut strokes = page.drawing.strokes;
+        strokes.shift_sources(offset);
+        all.drawing.strokes.append(strokes);
         for (pen, settings) in page.pens {
             let known = all.pens.get(&pen).and_then(|known| known.color);
             if let (Some(kept), Some(lost)) = (known, settings.color)
@@ -304,7 +299,7 @@ mod tests {
     fn page(pens: &[u16]) -> Page {
         let stroke = |&pen: &u16| {
             let points = vec![Point::ZERO, Point::new(10.0, f64::from(pen))];
-            Stroke::polyline(Pen(pen), points, Span { start: 1, end: 2 }).unwrap()
+            Stroke::polyline(Pen(pen), points, drawing::Span { start: 1, end: 2 }).unwrap()
         };
         let settings = |pen: u16| PenSettings {
             color: Some([pen as u8, 0, 0]),

@@ -206,10 +206,15 @@ fn plan<'a>(
         if !matches!(source.fault, Fault::JointLimit { .. }) || !restarted.insert(*stroke) {
             return planned;
         }
-        match restart::restarted(machine, &drawing.strokes[*stroke]) {
-            Some(other) => drawing.strokes[*stroke] = other,
-            None => return planned,
-        }
+        let other = drawing.strokes.get(*stroke).and_then(|stroke| restart::restarted(machine, &stroke));
+        let Some(other) = other else { return planned };
+        let mut number = 0;
+        drawing.strokes.update(|changed| {
+            if number == *stroke {
+                changed.clone_from(&other);
+            }
+            number += 1;
+        });
     }
 }
 

@@ -91,13 +91,16 @@ pub fn on_paper(drawing: Drawing, machine: &Machine) -> Drawing {
 }
 
 fn moved(mut drawing: Drawing, by: impl Fn(Pen) -> Vec2) -> Drawing {
-    for stroke in &mut drawing.strokes {
+    // Strokes that stay where they are keep their bits.
+    if drawing.pens().into_iter().all(|pen| by(pen) == Vec2::ZERO) {
+        return drawing;
+    }
+    drawing.strokes.update(|stroke| {
         let by = by(stroke.pen);
-        // Strokes that stay where they are keep their bits.
         if by != Vec2::ZERO {
             stroke.transform(Affine::translate(by));
         }
-    }
+    });
     drawing
 }
 

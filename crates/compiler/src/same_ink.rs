@@ -62,7 +62,7 @@ mod tests {
             let arc = EllipticArc::circular(Point::new(5.0, 5.0), radius, start, std::f64::consts::TAU);
             let mut stroke = Stroke::new(Pen(1), arc.eval(0.0), Span::default());
             stroke.arc(arc);
-            Drawing { strokes: vec![stroke] }
+            Drawing::from(vec![stroke])
         };
         assert!(same_ink(&circle(2.0, 0.0), &circle(2.0, 1.0)));
         assert!(!same_ink(&circle(2.0, 0.0), &circle(2.1, 0.0)));
@@ -77,11 +77,11 @@ mod tests {
             let arc = EllipticArc::circular(Point::ZERO, 1.0, 0.0, sweep);
             let mut stroke = Stroke::new(Pen(1), Point::new(1.0, 0.0), Span::default());
             stroke.arc(arc);
-            Drawing { strokes: vec![stroke] }
+            Drawing::from(vec![stroke])
         };
         assert!(!same_ink(&half(std::f64::consts::PI), &half(-std::f64::consts::PI)));
         let mut turned = half(2.0);
-        turned.strokes[0].reverse();
+        turned.strokes.update(Stroke::reverse);
         assert!(same_ink(&half(2.0), &turned));
     }
 }

@@ -57,7 +57,7 @@ fn plans_over_the_sheet_are_certified() {
         let mut circle = Stroke::new(Pen(2), Point::new(0.9, 0.5), Span::default());
         circle.arc(EllipticArc::circular(Point::new(0.5, 0.5), 0.4, 0.0, std::f64::consts::TAU));
         let cross = polyline([(0.02, 0.02), (0.98, 0.98), (0.98, 0.02), (0.02, 0.98)]);
-        let drawing = Drawing { strokes: vec![cross, circle] };
+        let drawing = Drawing::from(vec![cross, circle]);
         let request = Request {
             tolerance_mm: 0.1,
             period_us: 10_000,

@@ -51,7 +51,7 @@ fn is_certified(machine: &Machine, strokes: Vec<Stroke>) -> Result<(), TestCaseE
         joint_fit: true,
         allow_over_limit: false,
     };
-    let drawing = Drawing { strokes };
+    let drawing = Drawing::from(strokes);
     let compiled = compile(&drawing, machine, &request, &|_| ());
     let compiled = compiled.map_err(|error| TestCaseError::fail(format!("{error:?}")))?;
     // Where half a tick is a tenth of the sheet, whole ticks may lie out of reach: such a plan is refused.

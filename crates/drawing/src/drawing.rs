@@ -1,16 +1,20 @@
 //! Drawings.
 
-use std::collections::BTreeSet;
-
 use kurbo::{Affine, Rect};
 
-use crate::{Pen, Side, Stroke, clip_stroke};
+use crate::{Pen, Side, Strokes, clip_stroke};
 
 /// The ink on the paper: strokes in the order in which they are drawn; mm, y up.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawing {
     /// The strokes.
-    pub strokes: Vec<Stroke>,
+    pub strokes: Strokes,
+}
+
+impl<S: Into<Strokes>> From<S> for Drawing {
+    fn from(strokes: S) -> Self {
+        Self { strokes: strokes.into() }
+    }
 }
 
 impl Drawing {
@@ -21,7 +25,7 @@ impl Drawing {
 
     /// The bounding box of all strokes, mm; `None` for an empty drawing.
     pub fn bounding_box(&self) -> Option<Rect> {
-        self.strokes.iter().map(Stroke::bounding_box).reduce(|bounds, other| bounds.union(other))
+        self.strokes.iter().map(|stroke| stroke.bounding_box()).reduce(|bounds, other| bounds.union(other))
     }
 
     /// The length of all strokes, mm.
@@ -31,20 +35,17 @@ impl Drawing {
 
     /// Applies an affine map to every stroke.
     pub fn transform(&mut self, map: Affine) {
-        for stroke in &mut self.strokes {
-            stroke.transform(map);
-        }
+        self.strokes.transform(map);
     }
 
     /// The parts of its strokes on one side of the window; see [`clip_stroke`].
     #[must_use]
     pub fn clipped(&self, window: Rect, side: Side) -> Self {
-        Self { strokes: self.strokes.iter().flat_map(|stroke| clip_stroke(stroke, window, side)).collect() }
+        Self { strokes: self.strokes.iter().flat_map(|stroke| clip_stroke(&stroke, window, side)).collect() }
     }
 
     /// The pens of its strokes, each once, in ascending order.
     pub fn pens(&self) -> Vec<Pen> {
-        let pens: BTreeSet<Pen> = self.strokes.iter().map(|stroke| stroke.pen).collect();
-        pens.into_iter().collect()
+        self.strokes.pens()
     }
 }

@@ -26,6 +26,31 @@ impl Pitch {
     fn mm(self) -> f64 {
         f64::from(self.0.get()) / PICOMETRES_A_MM
     }
+
+    fn per_mm(self) -> f64 {
+        PICOMETRES_A_MM / f64::from(self.0.get())
+    }
+
+    /// The multiple of the pitch that has exactly the bits of this coordinate, mm.
+    pub(crate) fn multiple(self, mm: f64) -> Option<i32> {
+        let cell = nearest(mm, self.per_mm());
+        (self.at(cell).to_bits() == mm.to_bits()).then_some(cell)
+    }
+
+    /// The coordinate of a multiple, mm.
+    pub(crate) fn at(self, cell: i32) -> f64 {
+        self.mm() * f64::from(cell)
+    }
+
+    /// The pitch as four bytes.
+    pub(crate) fn code(self) -> [u8; 4] {
+        self.0.get().to_le_bytes()
+    }
+
+    /// The pitch of four bytes that [`Self::code`] made.
+    pub(crate) fn of_code(code: [u8; 4]) -> Option<Self> {
+        NonZeroU32::new(u32::from_le_bytes(code)).map(Self)
+    }
 }
 
 /// 1.5 * 2^52: the low bits of `x + ROUND` are `x` rounded to an integer, ties to even.
@@ -56,16 +81,18 @@ pub(crate) struct Steps {
     code: Box<[u8]>,
 }
 
-/// The smallest encoding of a polyline.
-pub(crate) enum Encoding {
-    Pair(Pair),
-    Steps(Steps),
+/// What [`encode`] wrote.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    Pair,
+    Steps,
 }
 
-/// Encodes a polyline; `None` without points, if a point is off the lattice, or if a difference
-/// needs more than two bytes (unless there are two points only).
-pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
-    let (mm, per_mm) = (pitch.mm(), PICOMETRES_A_MM / f64::from(pitch.0.get()));
+/// Appends the code of a polyline to `code`. `None` without points, if a point is off the lattice,
+/// or if a difference needs more than two bytes (unless there are two points only).
+#[inline]
+pub(crate) fn encode(points: &[Point], pitch: Pitch, code: &mut Vec<u8>) -> Option<Form> {
+    let (mm, per_mm) = (pitch.mm(), pitch.per_mm());
     let cell = |p: Point| [nearest(p.x, per_mm), nearest(p.y, per_mm)];
     let lies_on = |p: Point, [x, y]: [i32; 2]| mm * f64::from(x) == p.x && mm * f64::from(y) == p.y;
     let first = cell(*points.first()?);
@@ -82,7 +109,8 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
         return None;
     }
     if points.len() == 2 {
-        return Some(Encoding::Pair(Pair { pitch, ends: [first, at] }));
+        Pair { pitch, ends: [first, at] }.write(code);
+        return Some(Form::Pair);
     }
     // A difference that wraps around still leads from one point to the next, because decoding
     // wraps around too.
@@ -91,7 +119,7 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
         0x80..=0x7fff => 2,
         _ => return None,
     };
-    let mut code = Vec::with_capacity(STEPS + 2 * usize::from(width) * (points.len() - 1));
+    code.reserve(STEPS + 2 * usize::from(width) * (points.len() - 1));
     code.push(width);
     code.extend(pitch.0.get().to_le_bytes());
     code.extend(first[0].to_le_bytes());
@@ -108,7 +136,7 @@ pub(crate) fn fit(points: &[Point], pitch: Pitch) -> Option<Encoding> {
         }
         at = next;
     }
-    Some(Encoding::Steps(Steps { code: code.into_boxed_slice() }))
+    Some(Form::Steps)
 }
 
 /// The magnitude bits of a difference: the number, or its complement if it is negative.
@@ -117,6 +145,22 @@ fn size(step: i32) -> u32 {
 }
 
 impl Pair {
+    /// Appends 20 bytes: pitch, then both points.
+    pub(crate) fn write(&self, code: &mut Vec<u8>) {
+        code.extend(self.pitch.code());
+        let [[a, b], [c, d]] = self.ends;
+        code.extend([a, b, c, d].iter().flat_map(|cell| cell.to_le_bytes()));
+    }
+
+    /// The pair that [`Self::write`] wrote.
+    pub(crate) fn read(code: &[u8]) -> Option<Self> {
+        let mut words = code.chunks_exact(4).map(|word| std::array::from_fn(|k| word[k]));
+        let pitch = Pitch::of_code(words.next()?)?;
+        let mut cells = words.map(i32::from_le_bytes);
+        let mut point = || Some([cells.next()?, cells.next()?]);
+        Some(Self { pitch, ends: [point()?, point()?] })
+    }
+
     pub(crate) fn points(&self) -> [Point; 2] {
         let mm = self.pitch.mm();
         self.ends.map(|[x, y]| Point::new(mm * f64::from(x), mm * f64::from(y)))
@@ -124,6 +168,15 @@ impl Pair {
 }
 
 impl Steps {
+    /// From a code of the form [`Form::Steps`].
+    pub(crate) fn of_code(code: &[u8]) -> Self {
+        Self { code: code.into() }
+    }
+
+    pub(crate) fn code(&self) -> &[u8] {
+        &self.code
+    }
+
     /// The number of points.
     pub(crate) fn len(&self) -> usize {
         1 + (self.code.len() - STEPS) / self.bytes_a_step()
@@ -193,9 +246,11 @@ mod tests {
     use super::*;
 
     fn back(points: &[Point], pitch: Pitch) -> Option<Vec<Point>> {
-        fit(points, pitch).map(|fitted| match fitted {
-            Encoding::Pair(pair) => pair.points().to_vec(),
-            Encoding::Steps(steps) => {
+        let mut code = Vec::new();
+        encode(points, pitch, &mut code).map(|form| match form {
+            Form::Pair => Pair::read(&code).unwrap().points().to_vec(),
+            Form::Steps => {
+                let steps = Steps::of_code(&code);
                 assert_eq!(steps.len(), points.len());
                 steps.points().collect()
             }
@@ -228,7 +283,7 @@ mod tests {
     #[test]
     fn off_lattice_points_and_pitches_are_rejected() {
         let pitch = Pitch::from_mm(0.025).unwrap();
-        assert!(fit(&[], pitch).is_none());
+        assert!(back(&[], pitch).is_none());
         assert!(back(&[Point::new(0.01, 0.0)], pitch).is_none());
         assert!(back(&[Point::new(0.025, f64::NAN)], pitch).is_none());
         assert!(back(&[Point::new(0.025, f64::INFINITY)], pitch).is_none());

@@ -1,7 +1,7 @@
 //! Geometry of a pen drawing: strokes of lines, elliptic arcs and cubic Bézier curves.
 //!
 //! Units are millimetres and radians. y points up, angles are counterclockwise. A [`Drawing`] is a
-//! list of [`Stroke`]s. A stroke is a connected path drawn with one pen; its pieces are
+//! list of [`Stroke`]s, packed in [`Strokes`]. A stroke is a connected path drawn with one pen; its pieces are
 //! [`Segment`]s. Arcs and curves are kept exact; the consumer flattens them at its own tolerance.
 //!
 //! This crate knows no input format, machine, time or file.
@@ -28,10 +28,13 @@
 //! assert_eq!(ellipse.semi_axes(), (6.0, 3.0));
 //!
 //! // Chords within 0.01 mm of the stroke.
-//! let drawing = Drawing { strokes: vec![arch] };
-//! let chords = drawing.strokes[0].flatten(0.01);
+//! let chords = arch.flatten(0.01);
 //! assert!(chords.len() > 30 && chords.len() < 60);
+//!
+//! // A drawing holds its strokes packed, and makes them when they are asked for.
+//! let drawing = Drawing::from(vec![arch.clone()]);
 //! assert_eq!(drawing.pens(), [Pen(1)]);
+//! assert_eq!(drawing.strokes.iter().next(), Some(arch));
 //! ```
 
 mod arc;
@@ -43,6 +46,7 @@ mod lattice;
 mod path;
 mod segment;
 mod stroke;
+mod strokes;
 
 pub use arc::EllipticArc;
 pub use clip::{Side, clip_segment, clip_stroke};
@@ -51,5 +55,7 @@ pub use drawing::Drawing;
 pub use hatch::{FillRule, HatchGrid, HatchLine};
 pub use kurbo::{Affine, CubicBez, Line, Point, Rect, Vec2};
 pub use lattice::Pitch;
+pub use path::Trail;
 pub use segment::Segment;
 pub use stroke::{Pen, Span, Stroke};
+pub use strokes::{IntoIter, Iter, Lettering, Strokes};

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use kurbo::{Affine, CubicBez, Line, Point};
 
-use crate::lattice::{self, Encoding, Pair, Points, Steps};
+use crate::lattice::{self, Form, Pair, Points, Steps};
 use crate::{EllipticArc, Pitch, Segment};
 
 /// A segment of a path that is not straight, without its end points.
@@ -14,13 +14,65 @@ pub(crate) enum Curve {
     Cubic(Point, Point),
 }
 
-/// Vertices, and the curves between some of them.
+/// A path that can be extended: vertices, and the curves between some of them. An importer keeps one
+/// and uses it again for each stroke ([`Strokes::push_trail`](crate::Strokes::push_trail)).
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Free {
-    /// At least one.
-    vertices: Vec<Point>,
+pub struct Trail {
+    pub(crate) vertices: Vec<Point>,
     /// Sorted by segment index; segment `i` leads from `vertices[i]` to `vertices[i + 1]`.
-    curves: Vec<(usize, Curve)>,
+    pub(crate) curves: Vec<(usize, Curve)>,
+}
+
+impl Trail {
+    /// Forgets the path, and begins another at `start`.
+    pub fn begin(&mut self, start: Point) {
+        self.clear();
+        self.vertices.push(start);
+    }
+
+    /// Forgets the path. Its memory is used again.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.curves.clear();
+    }
+
+    /// The number of vertices; 0 without a path, 1 for a dot.
+    #[inline]
+    pub fn len(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// Whether there is no path.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.vertices.is_empty()
+    }
+
+    /// The last vertex, mm.
+    #[inline]
+    pub fn end(&self) -> Option<Point> {
+        self.vertices.last().copied()
+    }
+
+    /// Appends a line.
+    #[inline]
+    pub fn line_to(&mut self, point: Point) {
+        self.vertices.push(point);
+    }
+
+    /// Appends a segment, which should begin at the end of the path.
+    pub fn push(&mut self, segment: &Segment) {
+        match segment {
+            Segment::Line(line) => self.line_to(line.p1),
+            Segment::Arc(arc) => self.curve_to(Curve::Arc(*arc), arc.eval(1.0)),
+            Segment::Cubic(c) => self.curve_to(Curve::Cubic(c.p1, c.p2), c.p3),
+        }
+    }
+
+    pub(crate) fn curve_to(&mut self, curve: Curve, end: Point) {
+        self.curves.push((self.vertices.len() - 1, curve));
+        self.vertices.push(end);
+    }
 }
 
 /// The path of a stroke. All forms have at least one vertex.
@@ -32,8 +84,8 @@ pub(crate) enum Path {
     Steps(Steps),
     /// Any polyline.
     Line(Box<[Point]>),
-    /// Lines, arcs and cubics. The only form that can be extended.
-    Free(Box<Free>),
+    /// Lines, arcs and cubics, at least one vertex. The only form that can be extended.
+    Free(Box<Trail>),
 }
 
 /// Iterator over the vertices of a [`Path`].
@@ -68,20 +120,21 @@ impl Path {
 
     /// The smallest form for these points; `None` without points.
     pub(crate) fn on_lattice(points: &[Point], pitch: Pitch) -> Option<Self> {
-        match lattice::fit(points, pitch) {
-            Some(Encoding::Pair(pair)) => Some(Self::Pair(pair)),
-            Some(Encoding::Steps(steps)) => Some(Self::Steps(steps)),
+        let mut code = Vec::new();
+        match lattice::encode(points, pitch, &mut code) {
+            Some(Form::Pair) => Pair::read(&code).map(Self::Pair),
+            Some(Form::Steps) => Some(Self::Steps(Steps::of_code(&code))),
             None => Self::polyline(points.to_vec()),
         }
     }
 
     /// Converts to the form that can be extended, and changes it.
-    fn change(&mut self, change: impl FnOnce(&mut Free)) {
+    fn change(&mut self, change: impl FnOnce(&mut Trail)) {
         if let Self::Free(free) = self {
             change(free);
             return;
         }
-        let mut free = Box::new(Free { vertices: self.vertices().into_owned(), curves: Vec::new() });
+        let mut free = Box::new(Trail { vertices: self.vertices().into_owned(), curves: Vec::new() });
         change(&mut free);
         *self = Self::Free(free);
     }
@@ -91,10 +144,7 @@ impl Path {
     }
 
     pub(crate) fn curve_to(&mut self, curve: Curve, end: Point) {
-        self.change(|free| {
-            free.curves.push((free.vertices.len() - 1, curve));
-            free.vertices.push(end);
-        });
+        self.change(|free| free.curve_to(curve, end));
     }
 
     pub(crate) fn shrink_to_fit(&mut self) {

@@ -30,8 +30,8 @@ pub struct Stroke {
     /// The pen it is drawn with.
     pub pen: Pen,
     /// First byte and length of its source.
-    source: [u32; 2],
-    path: Path,
+    pub(crate) source: [u32; 2],
+    pub(crate) path: Path,
 }
 
 impl PartialEq for Stroke {
@@ -184,7 +184,7 @@ impl Stroke {
 }
 
 /// First byte and length in 32 bits each: most strokes hold no more than that themselves.
-fn packed(source: Span) -> [u32; 2] {
+pub(crate) fn packed(source: Span) -> [u32; 2] {
     let cut = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
     [cut(source.start), cut(source.end).saturating_sub(cut(source.start))]
 }

@@ -68,7 +68,7 @@ pub fn emit(drawing: &Drawing, options: &EmitOptions) -> Vec<u8> {
             pen = stroke.pen.0;
             out.extend_from_slice(format!("SP{pen};\n").as_bytes());
         }
-        let points = whole_units(stroke, options);
+        let points = whole_units(&stroke, options);
         match options.encoding {
             Encoding::Decimal => decimal(&points, &mut out),
             Encoding::Base64 => encoded(&points, 64, &mut out),

@@ -7,7 +7,7 @@
 //! // One page with one stroke of pen 1: 10 mm to the right, 10 mm up.
 //! let drawing = &document.pages[0].drawing;
 //! assert_eq!(drawing.strokes.len(), 1);
-//! assert_eq!(drawing.strokes[0].pen, hpgl::Pen(1));
+//! assert_eq!(drawing.pens(), [hpgl::Pen(1)]);
 //! assert_eq!(drawing.length(), 20.0);
 //!
 //! // `QQ` is no command: it is skipped and reported with its bytes.

@@ -21,7 +21,7 @@ fn bounds(file: &[u8]) -> Rect {
 fn end(file: &str) -> (f64, f64) {
     let file = format!("{file};PD;PU;");
     let document = document(file.as_bytes());
-    let last = document.pages[0].drawing.strokes.last().expect("a dot");
+    let last = document.pages[0].drawing.strokes.iter().last().expect("a dot");
     assert!(last.is_dot());
     let round = |mm: f64| (mm / hpgl::PLOTTER_UNIT_MM * 1e6).round() / 1e6;
     (round(last.start().x), round(last.start().y))
@@ -145,7 +145,7 @@ fn character_sets() {
 #[test]
 fn symbol_mode_positions() {
     let document = document(b"IN;SP1;SI1,2;SM+;PA1000,1000;PD2000,1000;SM;PD3000,1000;PU;");
-    let strokes = &document.pages[0].drawing.strokes;
+    let strokes = document.pages[0].drawing.strokes.to_vec();
     // Two bars at each of two points, and the line in two strokes.
     assert_eq!(strokes.len(), 6);
     let symbol = strokes[0].bounding_box().union(strokes[1].bounding_box());

@@ -101,7 +101,7 @@ fn single_command_of_file_length() {
     let document = check(&file);
     assert_eq!(document.pages[0].drawing.strokes.len(), 1);
     // The first point is where the pen is already.
-    assert_eq!(document.pages[0].drawing.strokes[0].segment_count(), 99_999);
+    assert_eq!(document.pages[0].drawing.strokes.to_vec()[0].segment_count(), 99_999);
     assert_eq!(document.summary.commands, 4);
 }
 

@@ -479,7 +479,7 @@ fn diagnostic_positions() {
 fn stroke_source_spans() {
     let file = b"IN;SP1;PU0,0;PD400,0;PA400,400;PU;";
     let document = document(file);
-    let source = document.pages[0].drawing.strokes[0].source();
+    let source = document.pages[0].drawing.strokes.to_vec()[0].source();
     assert_eq!(&file[source.start..source.end], b"PD400,0;PA400,400;");
 }
 
@@ -516,7 +516,7 @@ fn plotter_profile_selection() {
     // A plotter named in the options stays.
     let options = Options::for_plotter("hp7475a", Some("a3")).expect("built in");
     let document = read(b"IN;PS4;SP1;SC0,1,0,1;PA0,0;PD1,1;", &options);
-    let end = document.pages[0].drawing.strokes[0].end();
+    let end = document.pages[0].drawing.strokes.to_vec()[0].end();
     assert!((end.x - 15370.0 * hpgl::PLOTTER_UNIT_7475A_MM).abs() < 1e-9);
 }
 
@@ -577,7 +577,7 @@ fn absurd_numbers_are_reported() {
         let document = read(&[file, b"PA;PU7000,7000;PD7400,7000;PU;"].concat(), &Options::default());
         let codes: Vec<&str> = document.diagnostics.iter().map(|d| d.code.name()).collect();
         assert!(codes.contains(&code), "{name}: {codes:?}");
-        let last = document.pages[0].drawing.strokes.last().map(|stroke| (stroke.start(), stroke.end()));
+        let last = document.pages[0].drawing.strokes.iter().last().map(|stroke| (stroke.start(), stroke.end()));
         assert_eq!(last, Some((Point::new(175.0, 175.0), Point::new(185.0, 175.0))), "{name}");
     }
 }

@@ -30,7 +30,7 @@ fn read(text: &str) -> Drawing {
             _ => {}
         }
     }
-    Drawing { strokes }
+    Drawing::from(strokes)
 }
 
 /// Travel time, s, of two coupled motors at 200 mm/s and 2000 mm/s² each, plus 0.3 s for lift and

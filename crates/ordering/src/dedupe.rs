@@ -24,15 +24,17 @@ fn segment_key(segment: &Segment) -> SegmentKey {
 /// last stroke. Order and direction stay.
 #[must_use]
 pub fn without_duplicates(drawing: Drawing) -> Drawing {
-    let mut keep = vec![true; drawing.strokes.len()];
-    for pen in drawing.pens() {
-        let mine: Vec<usize> = (0..keep.len()).filter(|&at| drawing.strokes[at].pen == pen).collect();
-        let strokes: Vec<&Stroke> = mine.iter().map(|&at| &drawing.strokes[at]).collect();
+    let pens = drawing.pens();
+    let all: Vec<Stroke> = drawing.strokes.into_iter().collect();
+    let mut keep = vec![true; all.len()];
+    for pen in pens {
+        let mine: Vec<usize> = (0..keep.len()).filter(|&at| all[at].pen == pen).collect();
+        let strokes: Vec<&Stroke> = mine.iter().map(|&at| &all[at]).collect();
         for (at, keeps) in mine.into_iter().zip(kept(&strokes)) {
             keep[at] = keeps;
         }
     }
-    let strokes = drawing.strokes.into_iter().zip(keep).filter_map(|(stroke, keep)| keep.then_some(stroke));
+    let strokes = all.into_iter().zip(keep).filter_map(|(stroke, keep)| keep.then_some(stroke));
     Drawing { strokes: strokes.collect() }
 }
 

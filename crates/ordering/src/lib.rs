@@ -17,7 +17,7 @@
 //!     let ends = vec![Point::new(x, 0.0), Point::new(x, 10.0)];
 //!     Stroke::polyline(Pen(1), ends, Span::default()).expect("a polyline has points")
 //! };
-//! let drawing = Drawing { strokes: vec![line(0.0), line(20.0), line(10.0)] };
+//! let drawing = Drawing::from(vec![line(0.0), line(20.0), line(10.0)]);
 //! // Two independent axes at 100 mm/s: a move takes as long as its longer component.
 //! let seconds = |a: Point, b: Point| f64::max((a.x - b.x).abs(), (a.y - b.y).abs()) / 100.0;
 //! let start = Some(Point::new(0.0, 0.0));
@@ -66,9 +66,10 @@ pub fn optimize_with_progress(
     options: &Options,
     progress: &dyn Fn(f64),
 ) -> (Drawing, Report) {
-    let strokes_before = drawing.strokes.len();
-    let (travel_cost_before, travel_mm_before) = report::travel(&drawing.strokes, cost, options);
-    let mut pens = by_pen(drawing.strokes, options.pen_order.as_deref());
+    let strokes: Vec<Stroke> = drawing.strokes.into_iter().collect();
+    let strokes_before = strokes.len();
+    let (travel_cost_before, travel_mm_before) = report::travel(&strokes, cost, options);
+    let mut pens = by_pen(strokes, options.pen_order.as_deref());
     if options.dedupe {
         pens = pens.into_iter().map(dedupe::dedupe).collect();
     }
@@ -94,7 +95,7 @@ pub fn optimize_with_progress(
         travel_mm_before,
         travel_mm_after,
     };
-    (Drawing { strokes }, report)
+    (Drawing::from(strokes), report)
 }
 
 /// The strokes of each pen in file order; pens as in `pen_order`, then by their first stroke.

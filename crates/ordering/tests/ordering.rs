@@ -10,10 +10,10 @@ fn stroke(pen: u16, points: &[(f64, f64)]) -> Stroke {
 }
 
 fn order(strokes: Vec<Stroke>, options: &Options) -> (Vec<Stroke>, Report) {
-    let (drawing, report) = optimize(Drawing { strokes }, &distance, options);
+    let (drawing, report) = optimize(Drawing::from(strokes), &distance, options);
     assert_eq!(report.strokes_after, drawing.strokes.len());
     assert_eq!(report.strokes_before - report.duplicates_removed - report.merged, report.strokes_after);
-    (drawing.strokes, report)
+    (drawing.strokes.to_vec(), report)
 }
 
 fn plain() -> Options {
@@ -163,10 +163,10 @@ proptest! {
         }
         // With a constant cost merging is never undone because of travel.
         let free = |_: Point, _: Point| 0.0;
-        let (merged, report) = optimize(Drawing { strokes: strokes.clone() }, &free, &Options::default());
+        let (merged, report) = optimize(Drawing::from(strokes.clone()), &free, &Options::default());
         prop_assert_eq!(merged.strokes.len(), fewest);
         prop_assert_eq!(report.merged, strokes.len() - fewest);
-        prop_assert_eq!(pieces(&merged.strokes), pieces(&strokes));
+        prop_assert_eq!(pieces(&merged.strokes.to_vec()), pieces(&strokes));
     }
 
     #[test]
@@ -256,7 +256,7 @@ fn crossing_strokes_are_merged_straight() {
         stroke(1, &[(1.0, 0.0), (1.0, -1.0)]),
     ];
     let free = |_: Point, _: Point| 0.0;
-    let (merged, _) = optimize(Drawing { strokes }, &free, &Options::default());
+    let (merged, _) = optimize(Drawing::from(strokes), &free, &Options::default());
     assert_eq!(merged.strokes.len(), 2);
     for stroke in &merged.strokes {
         let (from, to) = (stroke.start(), stroke.end());
@@ -305,8 +305,8 @@ fn hatch_of_equal_lines_is_drawn_back_and_forth() {
 fn nan_cost_keeps_file_order() {
     let strokes: Vec<Stroke> = [5.0, 1.0, 3.0].iter().map(|&x| stroke(1, &[(x, 0.0), (x, 1.0)])).collect();
     let nan = |_: Point, _: Point| f64::NAN;
-    let (ordered, _) = optimize(Drawing { strokes: strokes.clone() }, &nan, &plain());
-    assert_eq!(ordered.strokes, strokes);
+    let (ordered, _) = optimize(Drawing::from(strokes.clone()), &nan, &plain());
+    assert_eq!(ordered.strokes.to_vec(), strokes);
 }
 
 /// A circle of one arc that starts at its far side in the file.

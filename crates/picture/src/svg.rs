@@ -49,7 +49,7 @@ pub fn write<W: Write + ?Sized>(drawing: &Drawing, style: &Style, out: &mut W) -
         text.str("\" stroke=\"").str(&hex(pen_colour(pen.0, &style.colors))).str("\">\n");
         for stroke in drawing.strokes.iter().filter(|stroke| stroke.pen == pen) {
             text.str("<path d=\"");
-            path(&mut text, stroke)?;
+            path(&mut text, &stroke)?;
             text.str("\"/>\n").flush_if_full()?;
         }
         text.str("</g>\n");

@@ -226,7 +226,7 @@ fn phase() -> Result<String, Failure> {
     let mut strokes = vec![polyline(&points)];
     strokes.push(polyline(&[(60.0, 140.0), (120.0, 140.0), (120.0, 160.0), (60.0, 150.0)].map(Point::from)));
     let settings = Settings::new(0.1, 4000);
-    let trajectory = plan(&machine, Drawing { strokes }, &settings)?;
+    let trajectory = plan(&machine, Drawing::from(strokes), &settings)?;
     let period = settings.period_us as f64 * 1e-6;
     let rows: Vec<[f64; 2]> = trajectory.rows().filter(|row| row.row.pen > 0).map(|row| row.exact).collect();
     let mut picture = Picture::new(Rect::new(60.0, 40.0, 620.0, 310.0), Rect::new(-1.2, -1.2, 1.2, 1.2));

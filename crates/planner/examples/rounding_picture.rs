@@ -28,7 +28,7 @@ fn picture() -> Result<String, Failure> {
     let mut stroke = Stroke::new(Pen(1), from, Span::default());
     stroke.line_to(from + (40.0, 14.0));
     stroke.cubic_to(from + (43.3, 15.2), from + (44.0, 18.0), from + (42.8, 21.3));
-    let drawing = Drawing { strokes: vec![stroke] };
+    let drawing = Drawing::from(vec![stroke]);
     let window = Rect::from_center_size(from + (41.2, 16.2), (WORLD_MM, WORLD_MM));
     let (width, height) = (2.0 * SIDE + 40.0, SIDE + 50.0);
     let mut text = format!(

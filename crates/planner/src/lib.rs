@@ -37,7 +37,7 @@
 //! let machine = Machine::new(parts)?;
 //! let line = |to: Point| -> Option<Drawing> {
 //!     let points = vec![Point::new(10.0, 10.0), to];
-//!     Some(Drawing { strokes: vec![Stroke::polyline(Pen(1), points, Span::default())?] })
+//!     Some(Drawing::from(vec![Stroke::polyline(Pen(1), points, Span::default())?]))
 //! };
 //! let settings = Settings::new(0.1, 10_000);
 //!

@@ -128,7 +128,7 @@ fn divided_at_pole(machine: &Machine, mut drawing: Drawing) -> Drawing {
             _ => None,
         };
         if stroke.segments().all(|segment| on_pole(&segment).is_none()) {
-            drawing.strokes.push(stroke);
+            drawing.strokes.push(&stroke);
             continue;
         }
         let at_pole = |point| machine.pole_on(&Line::new(point, point)).is_some();
@@ -332,7 +332,8 @@ impl Trajectory<'_> {
         let planner = StrokePlanner { machine: self.machine, settings: &self.settings, budget: self.budget };
         Motions {
             planner,
-            strokes: &self.drawing.strokes,
+            strokes: self.drawing.strokes.iter(),
+            count: self.drawing.strokes.len(),
             next: 0,
             batch: VecDeque::new(),
             predicted: self.machine.start(),
@@ -350,11 +351,14 @@ impl Trajectory<'_> {
 #[derive(Clone, Debug)]
 struct Motions<'a> {
     planner: StrokePlanner<'a>,
-    strokes: &'a [Stroke],
+    /// The strokes after the batch.
+    strokes: drawing::Iter<'a>,
+    /// The number of all strokes.
+    count: usize,
     /// The stroke to plan next.
     next: usize,
-    /// Results for the strokes from `next` on, from predicted poses.
-    batch: VecDeque<Option<Result<PlannedStroke, OutOfReach>>>,
+    /// The strokes from `next` on, with results from predicted poses.
+    batch: VecDeque<(Stroke, Option<Result<PlannedStroke, OutOfReach>>)>,
     /// The predicted pose after the batch.
     predicted: JointPos,
     /// The pose after all queued motions.
@@ -374,7 +378,7 @@ impl Motions<'_> {
     /// The next motion; `None` at the end of the plan.
     fn next_motion(&mut self) -> Result<Option<Motion>, PlanError> {
         while self.queue.is_empty() {
-            if self.next < self.strokes.len() {
+            if self.next < self.count {
                 self.stroke()?;
             } else if self.finished {
                 return Ok(None);
@@ -392,10 +396,10 @@ impl Motions<'_> {
         if self.batch.is_empty() {
             self.plan_batch();
         }
-        let (index, stroke) = (self.next, &self.strokes[self.next]);
+        let index = self.next;
         self.next += 1;
-        let candidate = self.batch.pop_front().flatten();
-        let planned = self.planner.plan(stroke, &self.pose, candidate).map_err(|source| {
+        let Some((stroke, candidate)) = self.batch.pop_front() else { return Ok(()) };
+        let planned = self.planner.plan(&stroke, &self.pose, candidate).map_err(|source| {
             PlanError::OutOfReach { stroke: index, pen: stroke.pen, span: stroke.source(), source }
         })?;
         self.blended_strokes += usize::from(planned.has_blends);
@@ -466,20 +470,21 @@ impl Motions<'_> {
     fn plan_batch(&mut self) {
         let mut starts = Vec::new();
         let mut size = 0;
-        for stroke in &self.strokes[self.next..] {
-            let predicted = self.planner.predict_poses(stroke, &self.predicted);
+        for stroke in self.strokes.by_ref() {
+            let predicted = self.planner.predict_poses(&stroke, &self.predicted);
             if let Some((_, end)) = predicted {
                 self.predicted = end;
             }
-            starts.push((stroke, predicted.map(|(start, _)| start)));
             size += stroke.segment_count() + 1;
+            starts.push((stroke, predicted.map(|(start, _)| start)));
             if size >= BATCH {
                 break;
             }
         }
         let planner = self.planner;
-        let plan = |(stroke, start): (&Stroke, Option<JointPos>)| {
-            start.map(|start| planner.plan_from(stroke, start))
+        let plan = |(stroke, start): (Stroke, Option<JointPos>)| {
+            let planned = start.map(|start| planner.plan_from(&stroke, start));
+            (stroke, planned)
         };
         self.batch = starts.into_par_iter().map(plan).collect::<Vec<_>>().into();
     }

@@ -15,7 +15,7 @@ const OPTIMA: &str = include_str!("optima.tsv");
 fn drawing_time(machine: &Machine, origin: Point, points: &[(f64, f64)]) -> f64 {
     let points = points.iter().map(|(x, y)| Point::new(origin.x + x, origin.y + y)).collect();
     let stroke = Stroke::polyline(Pen(1), points, Span::default()).expect("there are points");
-    let trajectory = plan(machine, Drawing { strokes: vec![stroke] }, &Settings::new(TOLERANCE_MM, 1000));
+    let trajectory = plan(machine, Drawing::from(vec![stroke]), &Settings::new(TOLERANCE_MM, 1000));
     trajectory.expect("a plan").times().drawing_s
 }
 

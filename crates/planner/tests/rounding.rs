@@ -35,7 +35,7 @@ fn drawing() -> impl Strategy<Value = Drawing> {
         stroke
     });
     let stroke = prop_oneof![prop::collection::vec(point(), 1..6).prop_map(polyline), walk, arc];
-    prop::collection::vec(stroke, 1..5).prop_map(|strokes| Drawing { strokes })
+    prop::collection::vec(stroke, 1..5).prop_map(|strokes| Drawing::from(strokes))
 }
 
 fn law() -> impl Strategy<Value = TimingLaw> {
@@ -151,7 +151,7 @@ fn figures() -> Drawing {
         .transformed(Affine::new([1.0, 0.0, 0.0, 0.8, 0.0, 0.1]));
     let mut arc = Stroke::new(Pen(1), circle.eval(0.0), Span::default());
     arc.arc(circle);
-    Drawing { strokes: vec![polyline(spiral), polyline(zigzag), arc] }
+    Drawing::from(vec![polyline(spiral), polyline(zigzag), arc])
 }
 
 /// Root mean square of the distance of the ink from the path through the exact positions: four points
@@ -201,7 +201,7 @@ fn ink_along_the_path_is_nearer_on_every_machine() {
 fn rows_do_not_depend_on_threads_or_cache() {
     let machine = machines::arm();
     let strokes: Vec<Stroke> = (0..40).flat_map(|_| figures().strokes).collect();
-    let placed = fitted(&machine, &Drawing { strokes });
+    let placed = fitted(&machine, &Drawing::from(strokes));
     let settings = Settings::new(0.1, 10_000);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
@@ -228,7 +228,7 @@ fn stroke_from_start_pose_waits_for_the_pen() {
         vec![start, start + (20.3, 7.7), start + (3.1, 18.4), start],
         Span::default(),
     );
-    let drawing = Drawing { strokes: vec![stroke.expect("points")] };
+    let drawing = Drawing::from(vec![stroke.expect("points")]);
     let along = rows(&machine, &drawing, &Settings::new(0.1, 10_000), Rounding::Path);
     let down = along.iter().position(|row| row.row.pen != 0).expect("ink");
     assert_eq!(along[down].row.ticks, along[down + 1].row.ticks);

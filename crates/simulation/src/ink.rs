@@ -76,7 +76,7 @@ pub struct Target {
 impl Target {
     /// The strokes of a drawing.
     pub fn new(drawing: &Drawing) -> Self {
-        let flat = |stroke: &drawing::Stroke| (stroke.pen.0, stroke.flatten(CHORD_MM), stroke.source());
+        let flat = |stroke: drawing::Stroke| (stroke.pen.0, stroke.flatten(CHORD_MM), stroke.source());
         let strokes: Vec<_> = drawing.strokes.iter().map(flat).collect();
         let mut lists: BTreeMap<u16, Vec<Piece>> = BTreeMap::new();
         for (stroke, (pen, points, _)) in (0..).zip(&strokes) {
@@ -449,7 +449,7 @@ mod tests {
     #[test]
     fn ink_on_the_drawing_has_no_error() {
         let machine = machines::corexy();
-        let points: Vec<Point> = square().strokes[0].points().collect();
+        let points: Vec<Point> = square().strokes.to_vec()[0].points().collect();
         let error = recorded(&machine, &points, Vec2::ZERO);
         assert!(error.stray.max_mm < 1e-9 && error.missed.max_mm < 1e-9, "{error:?}");
         assert!((error.ink_mm - 90.0).abs() < 1e-9);
@@ -459,7 +459,7 @@ mod tests {
     #[test]
     fn shifted_ink_and_missing_ink_are_measured() {
         let machine = machines::corexy();
-        let points: Vec<Point> = square().strokes[0].points().collect();
+        let points: Vec<Point> = square().strokes.to_vec()[0].points().collect();
         let error = recorded(&machine, &points, Vec2::new(0.0, -2.0));
         assert!((error.stray.max_mm - 2.0).abs() < 1e-9, "{:?}", error.stray);
         assert_eq!(error.worst_stray.unwrap().source, Span { start: 3, end: 9 });
@@ -472,7 +472,7 @@ mod tests {
     #[test]
     fn overshoot_is_measured_across_the_second_side() {
         let machine = machines::corexy();
-        let points: Vec<Point> = square().strokes[0].points().collect();
+        let points: Vec<Point> = square().strokes.to_vec()[0].points().collect();
         // Ink 0.7 mm too far in x: beyond the corner at (80, 50).
         let error = recorded(&machine, &points, Vec2::new(0.7, 0.0));
         assert!((error.overshoot_max_mm - 0.7).abs() < 1e-9, "{error:?}");

@@ -105,7 +105,7 @@ fn sizes_and_places_come_from_css_too() {
 fn transform_origin_is_a_point_of_the_box() {
     let start = |style: &str| {
         let document = read(&format!("<path d='M40 40H60V50' style='{style};transform:rotate(180deg)'/>"));
-        let start = document.drawing.strokes[0].start();
+        let start = document.drawing.strokes.to_vec()[0].start();
         [start.x, 100.0 - start.y].map(f64::round)
     };
     assert_eq!(start("transform-origin:center"), [60.0, 60.0]);

@@ -26,7 +26,7 @@ fn strokes(content: &str) -> Vec<Stroke> {
         "{:?}",
         document.diagnostics
     );
-    document.drawing.strokes
+    document.drawing.strokes.to_vec()
 }
 
 /// The ends of straight strokes, with y down as in the file.
@@ -50,7 +50,7 @@ fn close(a: f64, b: f64) -> bool {
 fn page_is_in_mm_with_y_up() {
     let document = read("<path d='M10 20L30 40'/>");
     assert_eq!(document.page_mm, [100.0, 100.0]);
-    let stroke = &document.drawing.strokes[0];
+    let stroke = &document.drawing.strokes.to_vec()[0];
     assert_eq!((stroke.start(), stroke.end()), (Point::new(10.0, 80.0), Point::new(30.0, 60.0)));
     let text = page("<path d='M10 20L30 40'/>");
     assert_eq!(&text[stroke.source().start..stroke.source().end], "<path d='M10 20L30 40'/>");
@@ -490,7 +490,7 @@ fn text_as_outlines() {
         })
         .collect();
     assert_eq!(boxes, [[10.0, 40.0, 20.0, 50.0], [30.0, 40.0, 40.0, 50.0], [50.0, 30.0, 70.0, 50.0]]);
-    assert!(document.drawing.strokes.iter().all(Stroke::is_closed));
+    assert!(document.drawing.strokes.iter().all(|stroke| stroke.is_closed()));
     assert_eq!(document.diagnostics, []);
     // Fills are hatched, other families and missing characters reported.
     let hatched = read(text, Some(svg::Hatch { spacing_mm: 1.0, angle_rad: 0.0 }));

@@ -135,7 +135,7 @@ fn clip_path_of_thousands_of_shapes_ends() {
     // Half a pixel is 0.132 mm.
     let strokes = &document.drawing.strokes;
     assert!(strokes.len() > 50_000, "{} {:?}", strokes.len(), document.diagnostics);
-    for bounds in strokes.iter().map(drawing::Stroke::bounding_box) {
+    for bounds in strokes.iter().map(|stroke| stroke.bounding_box()) {
         assert!(bounds.width().max(bounds.height()) < 0.1324, "{bounds:?}");
     }
 }

@@ -40,7 +40,7 @@
 //! // Down, 10 mm along x and back, up. Rows are 0.1 s apart; each step has 50 ticks.
 //! let ends = vec![Point::new(0.0, 0.0), Point::new(10.0, 0.0)];
 //! let stroke = Stroke::polyline(Pen(1), ends, Span::default()).expect("two points");
-//! let drawing = Drawing { strokes: vec![stroke] };
+//! let drawing = Drawing::from(vec![stroke]);
 //! let ticks = [0, 0, 0, 50, 100, 50, 0, 0, 0];
 //! let mut rows: Vec<Row> = (0..9)
 //!     .map(|k| {

@@ -384,7 +384,7 @@ impl Target {
         }
         Self {
             pens,
-            sources: drawing.strokes.iter().map(drawing::Stroke::source).collect(),
+            sources: drawing.strokes.iter().map(|stroke| stroke.source()).collect(),
             cells: cells as usize,
             blocks: blocks as usize,
             sparse_mm: if sparse { cell } else { 0.0 },

@@ -196,7 +196,7 @@ fn badly_followed() -> impl Strategy<Value = (Drawing, Lines)> {
                 }
                 lines.push((stroke.pen.0, ink));
             }
-            let mut drawing = Drawing { strokes };
+            let mut drawing = Drawing::from(strokes);
             drawing.transform(drawing::Affine::translate((20.0, 20.0)));
             (drawing, lines)
         },

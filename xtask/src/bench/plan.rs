@@ -330,8 +330,8 @@ impl Stages {
             corner: CornerBlend::Parabola,
             row_mm: f64::INFINITY,
         };
-        let stroke = drawing.strokes.first().context("a workload without strokes")?;
-        let (sections, path) = fastest(|| sections(stroke, &budget));
+        let stroke = drawing.strokes.iter().next().context("a workload without strokes")?;
+        let (sections, path) = fastest(|| sections(&stroke, &budget));
         let (paths, joint_path) = fastest(|| {
             let joint_paths = sections.iter().map(|section| {
                 let pose = machine

@@ -258,7 +258,7 @@ pub(super) fn paths(
 ) -> Vec<Line> {
     let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
     program.start();
-    let mut pen = drawing.strokes.first().map(|stroke| stroke.pen).filter(|_| pauses);
+    let mut pen = drawing.strokes.iter().next().map(|stroke| stroke.pen).filter(|_| pauses);
     if let Some(first) = pen.filter(|first| drawing.strokes.iter().any(|stroke| stroke.pen != *first)) {
         program.change_pen(first.0, None);
     }
@@ -430,7 +430,7 @@ pub(super) fn stroke_times_s(strokes: usize, rows: impl Iterator<Item = Row>) ->
 
 /// The mean speed of each stroke in these times, mm/s, at most `max_mm_s`.
 pub(super) fn stroke_speeds_mm_s(drawing: &Drawing, times_s: &[f64], max_mm_s: f64) -> Vec<f64> {
-    let speed = |(stroke, seconds): (&drawing::Stroke, &f64)| {
+    let speed = |(stroke, seconds): (drawing::Stroke, &f64)| {
         if *seconds > 0.0 { (stroke.length() / seconds).clamp(0.1, max_mm_s) } else { max_mm_s }
     };
     drawing.strokes.iter().zip(times_s).map(speed).collect()

@@ -88,7 +88,7 @@ pub(super) fn find(
     let strokes = drawing.strokes.iter().zip(times_s);
     let mut speeds_mm_s: Vec<f64> = strokes
         .map(|(stroke, time_s)| {
-            stroke_speed_mm_s(&encode::stroke(stroke, options), *time_s, most_mm_s, &settings)
+            stroke_speed_mm_s(&encode::stroke(&stroke, options), *time_s, most_mm_s, &settings)
         })
         .collect();
     let mut grbl_s = duration_s(&settings, &speeds_mm_s);

@@ -87,7 +87,7 @@ pub fn encode(drawing: &Drawing, sheet: &Sheet<'_>) -> Result<Vec<Line>, Plotter
             encoder.instruction(format!("SP{pen};"));
         }
         encoder.row += 1;
-        encoder.stroke(stroke, index + 1)?;
+        encoder.stroke(&stroke, index + 1)?;
     }
     encoder.instruction("SP0;".to_owned());
     if !plotter.epilogue.is_empty() {

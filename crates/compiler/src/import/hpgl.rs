@@ -35,7 +35,7 @@ fn read(bytes: &[u8], options: &Options) -> Result<Document, ImportError> {
     let white = &document.summary.white_pens;
     let is_skipped = |pen: &Pen| options.skip_white_pens && white.contains(pen);
     let pages = document.pages.into_iter().map(|mut page| {
-        page.drawing.strokes.retain(|stroke| !is_skipped(&stroke.pen));
+        page.drawing.strokes.change_pens(|pen| (!is_skipped(&pen)).then_some(pen));
         page.pens.retain(|pen, _| !is_skipped(pen));
         Page {
             drawing: page.drawing,

@@ -72,7 +72,7 @@ mod tests {
     fn points_are_one_stroke() {
         assert!(looks_like_points(POV));
         let drawing = read(POV);
-        let stroke = &drawing.strokes[0];
+        let stroke = &drawing.strokes.to_vec()[0];
         let expected = [(70.05, 82.46), (74.1, 83.0), (70.05, 82.46)].map(|(x, y)| Point::new(x, y));
         assert_eq!(stroke.flatten(0.1), expected);
         assert_eq!(drawing.strokes.len(), 1);

@@ -219,7 +219,9 @@ fn deviation_text(text: &mut String, what: &str, deviation: &Deviation) {
 
 /// Pen changes while the strokes are drawn in their order.
 pub(super) fn pen_changes(drawing: &Drawing) -> usize {
-    drawing.strokes.windows(2).filter(|pair| pair[0].pen != pair[1].pen).count()
+    let mut pen = None;
+    let is_change = |stroke: drawing::Stroke| pen.replace(stroke.pen).is_some_and(|last| last != stroke.pen);
+    drawing.strokes.iter().map(is_change).filter(|change| *change).count()
 }
 
 /// A count with its noun: `1 stroke`, `3 strokes`.

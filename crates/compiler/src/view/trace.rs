@@ -44,7 +44,7 @@ pub(super) fn trace(rows: &[Row], machine: &Machine, drawn: &Drawing, placed: &D
     let mut traced = Traced { deviation_mm: vec![0.0; rows.len()], pieces: Vec::new() };
     let loads = replay::loads(rows, machine);
     for ((first, last), stroke) in runs.into_iter().zip(&drawn.strokes) {
-        let chords = chords(stroke, &sources);
+        let chords = chords(&stroke, &sources);
         let mut place = Place::default();
         let mut before: Option<Point> = None;
         for (row, load) in loads.iter().enumerate().take(last + 1).skip(first) {
@@ -162,9 +162,9 @@ mod tests {
         };
         let corner = point(10.0, 0.0);
         let placed = Drawing {
-            strokes: vec![stroke(&[point(0.0, 0.0), corner], 0), stroke(&[point(10.0, 10.0), corner], 20)],
+            strokes: vec![stroke(&[point(0.0, 0.0), corner], 0), stroke(&[point(10.0, 10.0), corner], 20)].into(),
         };
-        let drawn = Drawing { strokes: vec![stroke(&[point(0.0, 0.0), corner, point(10.0, 10.0)], 0)] };
+        let drawn = Drawing::from(vec![stroke(&[point(0.0, 0.0), corner, point(10.0, 10.0)], 0)]);
         let path =
             [(0.0, 0.0, 0), (0.0, 0.0, 1), (5.0, 0.0, 1), (10.0, 0.0, 1), (10.0, 4.0, 1), (10.0, 10.0, 0)];
         let rows: Vec<Row> = path

@@ -391,20 +391,20 @@ impl Interpreter {
         if !self.findings.has(codes::PEN_PUT_AWAY) {
             return;
         }
-        let strokes = || self.pages.iter().flat_map(|page| &page.drawing.strokes);
-        if strokes().all(|stroke| stroke.pen == Pen(0)) {
-            if strokes().next().is_some() {
+        let pens: Vec<Pen> = self.pages.iter().flat_map(|page| page.drawing.pens()).collect();
+        if pens.iter().all(|&pen| pen == Pen(0)) {
+            if !pens.is_empty() {
                 self.findings.recode(codes::PEN_PUT_AWAY, codes::ONLY_INK_WITHOUT_PEN, || {
                     "all drawing is done with the pen put away (SP0): pen 1 is taken".into()
                 });
             }
-            for stroke in self.pages.iter_mut().flat_map(|page| &mut page.drawing.strokes) {
-                stroke.pen = Pen(1);
+            for page in &mut self.pages {
+                page.drawing.strokes.change_pens(|_| Some(Pen(1)));
             }
             return;
         }
         for page in &mut self.pages {
-            page.drawing.strokes.retain(|stroke| stroke.pen != Pen(0));
+            page.drawing.strokes.change_pens(|pen| (pen != Pen(0)).then_some(pen));
         }
         self.pages.retain(|page| !page.drawing.is_empty());
     }

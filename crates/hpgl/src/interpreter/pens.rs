@@ -240,9 +240,7 @@ impl Interpreter {
         }
         let number = (1..=u16::MAX).find(|&number| !used.contains(&Pen(number))).unwrap_or(1);
         for page in &mut self.pages {
-            for stroke in page.drawing.strokes.iter_mut().filter(|stroke| stroke.pen == Pen(0)) {
-                stroke.pen = Pen(number);
-            }
+            page.drawing.strokes.change_pens(|pen| Some(if pen == Pen(0) { Pen(number) } else { pen }));
             let settings = page.pens.remove(&Pen(0));
             page.pens.extend(settings.map(|settings| (Pen(number), settings)));
         }

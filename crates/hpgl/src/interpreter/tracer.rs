@@ -1,11 +1,8 @@
 //! The pen on the paper: joins pen-down movement to strokes, clipped to the window; mm.
 
-use drawing::{Line, Pen, Pitch, Point, Rect, Segment, Span, Stroke, clip_segment};
+use drawing::{Line, Pen, Pitch, Point, Rect, Segment, Span, Strokes, Trail, clip_segment};
 
 use super::line_type::{Dash, Dashes};
-
-/// A stroke usually takes at least this many bytes of its file: `PU100,100;PD100,100;`.
-const BYTES_A_STROKE: usize = 20;
 
 /// Steps shorter than this (mm) are rounding, not movement.
 const NO_STEP: f64 = 1e-9;
@@ -17,17 +14,15 @@ fn same(a: Point, b: Point) -> bool {
 /// Gathers strokes.
 #[derive(Clone, Debug)]
 pub(crate) struct Tracer {
-    pub(crate) strokes: Vec<Stroke>,
+    pub(crate) strokes: Strokes,
     /// The plotter unit, by which nearly all points lie.
     pitch: Option<Pitch>,
     /// The pen in use.
     pen: Pen,
     /// The command at work.
     command: Span,
-    /// Vertices of the stroke being drawn, as long as it is straight.
-    points: Vec<Point>,
-    /// The stroke being drawn, once it has a curve.
-    curved: Option<Stroke>,
+    /// The stroke being drawn.
+    trail: Trail,
     /// The bytes of the stroke being drawn.
     source: Span,
     /// The pen came down at the only point yet: it leaves a dot.
@@ -46,14 +41,13 @@ impl Tracer {
     /// size of the file in bytes.
     pub(crate) fn new(dashes_left: f64, unit_mm: f64, file_bytes: usize) -> Self {
         Self {
-            // Capacity for the strokes of most files. Memory is only committed when used; growing
-            // would copy.
-            strokes: Vec::with_capacity(file_bytes / BYTES_A_STROKE),
+            // Strokes of most files take no more bytes than their text. Memory is only committed when
+            // used; growing would copy.
+            strokes: Strokes::with_capacity(file_bytes),
             pitch: Pitch::from_mm(unit_mm),
             pen: Pen(1),
             command: Span::default(),
-            points: Vec::new(),
-            curved: None,
+            trail: Trail::default(),
             source: Span::default(),
             dot: false,
             clip: None,
@@ -112,7 +106,7 @@ impl Tracer {
 
     /// Whether anything is drawn on this page.
     pub(crate) fn has_ink(&self) -> bool {
-        !self.strokes.is_empty() || !self.points.is_empty() || self.curved.is_some()
+        !self.strokes.is_empty() || !self.trail.is_empty()
     }
 
     /// Puts the pen down: a dot, unless it moves.
@@ -128,8 +122,8 @@ impl Tracer {
 
     /// Forgets that the pen came down here, if it has not moved.
     pub(crate) fn discard_dot(&mut self) {
-        if self.dot && self.points.len() == 1 {
-            self.points.clear();
+        if self.dot && self.trail.len() == 1 {
+            self.trail.clear();
             self.dot = false;
         }
     }
@@ -141,8 +135,7 @@ impl Tracer {
     }
 
     fn begin(&mut self, at: Point) {
-        self.points.clear();
-        self.points.push(at);
+        self.trail.begin(at);
         self.source = self.command;
         self.dot = false;
     }
@@ -177,17 +170,8 @@ impl Tracer {
     #[inline]
     fn append_line(&mut self, from: Point, to: Point) {
         self.connect(from);
-        match &mut self.curved {
-            Some(stroke) => {
-                if !same(stroke.end(), to) {
-                    stroke.line_to(to);
-                }
-            }
-            None => {
-                if !self.points.last().is_some_and(|&last| same(last, to)) {
-                    self.points.push(to);
-                }
-            }
+        if !self.trail.end().is_some_and(|end| same(end, to)) {
+            self.trail.line_to(to);
         }
         self.source.end = self.command.end;
     }
@@ -195,11 +179,7 @@ impl Tracer {
     /// Sees to it that the stroke being drawn ends at `from`.
     #[inline]
     fn connect(&mut self, from: Point) {
-        let end = match &self.curved {
-            Some(stroke) => Some(stroke.end()),
-            None => self.points.last().copied(),
-        };
-        if !end.is_some_and(|end| same(end, from)) {
+        if !self.trail.end().is_some_and(|end| same(end, from)) {
             self.finish();
             self.begin(from);
         }
@@ -246,45 +226,26 @@ impl Tracer {
             return;
         }
         self.connect(segment.start());
-        let stroke = match self.curved.take() {
-            Some(mut stroke) => {
-                stroke.push(*segment);
-                Some(stroke)
-            }
-            None => {
-                Stroke::polyline(self.pen, std::mem::take(&mut self.points), self.source).map(|mut stroke| {
-                    stroke.push(*segment);
-                    stroke
-                })
-            }
-        };
-        self.curved = stroke;
+        self.trail.push(segment);
         self.source.end = self.command.end;
     }
 
     /// Lifts the pen: what was drawn is a stroke.
     #[inline]
     pub(crate) fn finish(&mut self) {
-        if let Some(mut stroke) = self.curved.take() {
-            stroke.set_source(self.source);
-            stroke.shrink_to_fit();
-            self.strokes.push(stroke);
-        } else if self.points.len() > 1 || (self.dot && !self.points.is_empty()) {
-            // A copy, so that strokes hold no spare memory; the scratch list is used again.
-            let stroke = match self.pitch {
-                Some(pitch) => Stroke::on_lattice(self.pen, &self.points, self.source, pitch),
-                None => Stroke::polyline(self.pen, self.points.clone(), self.source),
-            };
-            self.strokes.extend(stroke);
+        if self.trail.len() > 1 || self.dot {
+            self.strokes.push_trail(self.pen, self.source, &self.trail, self.pitch);
         }
-        self.points.clear();
+        self.trail.clear();
         self.dot = false;
     }
 
     /// Ends the page.
-    pub(crate) fn take_page(&mut self) -> Vec<Stroke> {
+    pub(crate) fn take_page(&mut self) -> Strokes {
         self.finish();
-        std::mem::take(&mut self.strokes)
+        let mut strokes = std::mem::take(&mut self.strokes);
+        strokes.shrink_to_fit();
+        strokes
     }
 }
 

@@ -15,7 +15,7 @@ pub(crate) fn document(bytes: &[u8]) -> Document {
 /// The strokes of the first page in plotter units: `pen: x,y x,y ...`, curves marked by `~` before
 /// their end.
 pub(crate) fn ink(document: &Document) -> Vec<String> {
-    let stroke = |stroke: &drawing::Stroke| {
+    let stroke = |stroke: drawing::Stroke| {
         let plu = |mm: f64| {
             let value = mm / hpgl::PLOTTER_UNIT_MM;
             ((value * 1e4).round() / 1e4 + 0.0).to_string()

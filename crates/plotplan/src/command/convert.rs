@@ -97,7 +97,7 @@ fn convert_parts(job: &Job<'_>, inputs: &Inputs, names: &Names) -> Result<Vec<(S
         }
         for pen in page.drawing.pens() {
             let mut page = page.clone();
-            page.drawing.strokes.retain(|stroke| stroke.pen == pen);
+            page.drawing.strokes.change_pens(|other| (other == pen).then_some(pen));
             page.pens.retain(|other, _| *other == pen);
             parts.push((Part { drawing: &name, page: number, pen: Some(pen.0) }, page));
         }

@@ -75,7 +75,7 @@ pub(crate) fn read(tree: &Document<'_>, options: &Options<'_>, findings: &mut Fi
     }
     let Output { mut strokes, keys, .. } = walker.output;
     let pens = keys.number(options.pens, &mut strokes);
-    let mut drawing = Drawing { strokes };
+    let mut drawing = Drawing::from(strokes);
     let page_mm = page_mm.unwrap_or_else(|| {
         // No size at all: the page reaches from the origin to the ink's last corner.
         let bounds = drawing.bounding_box().unwrap_or_default();

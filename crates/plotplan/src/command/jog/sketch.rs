@@ -189,7 +189,7 @@ impl Jogger<'_> {
         };
         let period_us = (machine.parts().period_s * 1e6).round() as u64;
         let settings = Settings::new(tolerance_mm, period_us);
-        let drawing = Drawing { strokes: vec![stroke] };
+        let drawing = Drawing::from(vec![stroke]);
         let planned =
             planner::plan(&machine, drawing, &settings).map_err(|error| refused(error.to_string()))?;
         let rows: Vec<Row> = planned.rows().map(|row| row.row).collect();
