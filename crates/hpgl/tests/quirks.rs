@@ -577,7 +577,8 @@ fn absurd_numbers_are_reported() {
         let document = read(&[file, b"PA;PU7000,7000;PD7400,7000;PU;"].concat(), &Options::default());
         let codes: Vec<&str> = document.diagnostics.iter().map(|d| d.code.name()).collect();
         assert!(codes.contains(&code), "{name}: {codes:?}");
-        let last = document.pages[0].drawing.strokes.iter().last().map(|stroke| (stroke.start(), stroke.end()));
+        let last =
+            document.pages[0].drawing.strokes.iter().last().map(|stroke| (stroke.start(), stroke.end()));
         assert_eq!(last, Some((Point::new(175.0, 175.0), Point::new(185.0, 175.0))), "{name}");
     }
 }

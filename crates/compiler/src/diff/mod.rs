@@ -69,8 +69,7 @@ impl Side {
     /// A page of a drawing, in its own frame.
     pub fn of_drawing(name: &str, page: &Page) -> Self {
         let drawing = &page.drawing;
-        let line =
-            |stroke: drawing::Stroke| Polyline { pen: stroke.pen.0, points: stroke.flatten(CHORD_MM) };
+        let line = |stroke: drawing::Stroke| Polyline { pen: stroke.pen.0, points: stroke.flatten(CHORD_MM) };
         let mut facts = Facts::new();
         for (pen, settings) in &page.pens {
             let mut add = |what: &str, value: Option<String>| {

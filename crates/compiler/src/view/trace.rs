@@ -162,7 +162,8 @@ mod tests {
         };
         let corner = point(10.0, 0.0);
         let placed = Drawing {
-            strokes: vec![stroke(&[point(0.0, 0.0), corner], 0), stroke(&[point(10.0, 10.0), corner], 20)].into(),
+            strokes: vec![stroke(&[point(0.0, 0.0), corner], 0), stroke(&[point(10.0, 10.0), corner], 20)]
+                .into(),
         };
         let drawn = Drawing::from(vec![stroke(&[point(0.0, 0.0), corner, point(10.0, 10.0)], 0)]);
         let path =

@@ -170,9 +170,7 @@ fn write_arc(arc: &EllipticArc, [start, end]: [Point; 2], pitch: Option<Pitch>, 
         numbers.for_each(|number| code.extend(number.to_le_bytes()));
     }
     let is_left = is(b.to_point(), left_of(a).to_point());
-    if set(ArcFlags::LEFT, is_left)
-        && set(ArcFlags::RIGHT, is(b.to_point(), (-left_of(a)).to_point()))
-    {
+    if set(ArcFlags::LEFT, is_left) && set(ArcFlags::RIGHT, is(b.to_point(), (-left_of(a)).to_point())) {
         write_point(b.to_point(), code);
     }
     if set(ArcFlags::FROM_ZERO, start_rad.to_bits() == 0) {
@@ -237,7 +235,10 @@ fn write_free(trail: &Trail, code: &mut Vec<u8>) {
         match curve {
             Curve::Arc(EllipticArc { center, a, b, start_rad, sweep_rad }) => {
                 code.push(0);
-                write_points(&[*center, a.to_point(), b.to_point(), Point::new(*start_rad, *sweep_rad)], code);
+                write_points(
+                    &[*center, a.to_point(), b.to_point(), Point::new(*start_rad, *sweep_rad)],
+                    code,
+                );
             }
             Curve::Cubic(c1, c2) => {
                 code.push(1);
