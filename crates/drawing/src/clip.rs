@@ -124,8 +124,14 @@ pub fn clip_segment(segment: &Segment, window: Rect) -> Vec<(f64, f64)> {
     if !(window.x1 > window.x0 && window.y1 > window.y0) {
         return Vec::new();
     }
+    let is_within = |bounds: Rect| {
+        window.x0 <= bounds.x0 && bounds.x1 <= window.x1 && window.y0 <= bounds.y0 && bounds.y1 <= window.y1
+    };
+    if is_within(segment.loose_box()) {
+        return vec![(0.0, 1.0)];
+    }
     let bounds = segment.bounding_box();
-    if window.x0 <= bounds.x0 && bounds.x1 <= window.x1 && window.y0 <= bounds.y0 && bounds.y1 <= window.y1 {
+    if is_within(bounds) {
         return vec![(0.0, 1.0)];
     }
     if bounds.x1 < window.x0 || bounds.x0 > window.x1 || bounds.y1 < window.y0 || bounds.y0 > window.y1 {

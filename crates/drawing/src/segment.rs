@@ -123,6 +123,28 @@ impl Segment {
         }
     }
 
+    /// A box around the bounding box that needs no roots: that of an arc's whole ellipse, and of a
+    /// cubic's control points, mm.
+    pub fn loose_box(&self) -> Rect {
+        let (bounds, margin) = match self {
+            Self::Line(line) => return Rect::from_points(line.p0, line.p1),
+            Self::Arc(EllipticArc { center, a, b, .. }) => {
+                let half = |a: f64, b: f64| (a * a + b * b).sqrt();
+                let half = Vec2::new(half(a.x, b.x), half(a.y, b.y));
+                (
+                    Rect::from_points(*center - half, *center + half),
+                    half.x + half.y + center.x.abs() + center.y.abs(),
+                )
+            }
+            Self::Cubic(c) => {
+                let bounds = Rect::from_points(c.p0, c.p1).union(Rect::from_points(c.p2, c.p3));
+                (bounds, bounds.x0.abs().max(bounds.x1.abs()) + bounds.y0.abs().max(bounds.y1.abs()))
+            }
+        };
+        // For the rounding errors of points.
+        bounds.inflate(1e-12 * margin, 1e-12 * margin)
+    }
+
     /// The number of chords, equal in `t`, that keeps the chord error within `tolerance_mm`.
     ///
     /// Cubics: the chord of `f` over a step `h` has an error of `h²/8 max|f''|` at most, and the

@@ -87,6 +87,77 @@ proptest! {
     }
 
     #[test]
+    fn packed_strokes_are_restored(
+        strokes in proptest::collection::vec((proptest::collection::vec(segment(), 0..4), 0..3_u16), 0..8),
+        cells in proptest::collection::vec((-300..300i32, -40_000..40_000i32), 1..6),
+        (cx, cy, dx, dy) in (-9999..9999i32, -9999..9999i32, -999..999i32, -999..999i32),
+        (sweep, start) in (-400..400i32, 0..3),
+        maps in proptest::collection::vec(map(), 0..3),
+    ) {
+        let pitch = Pitch::from_mm(0.025).unwrap();
+        let at = |x: i32, y: i32| Point::new(0.025 * f64::from(x), 0.025 * f64::from(y));
+        let mut all = Vec::new();
+        for (index, (segments, pen)) in strokes.iter().enumerate() {
+            let mut stroke = Stroke::new(Pen(*pen), at(cx, cy), Span { start: index, end: 2 * index + 1 });
+            for segment in segments {
+                stroke.push(*segment);
+            }
+            all.push(stroke);
+        }
+        let points: Vec<Point> = cells.iter().map(|&(x, y)| at(x, y)).collect();
+        all.extend(Stroke::on_lattice(Pen(7), &points, Span::default(), pitch));
+        // Arcs as importers have them: on the lattice or not, from a rounded start or not, closed or not.
+        let a = at(dx, dy).to_vec2();
+        let b = Vec2::new(-a.y, a.x) * f64::from(start - 1);
+        let arc = EllipticArc {
+            center: at(cx, cy), a, b, start_rad: 0.5 * f64::from(start), sweep_rad: f64::from(sweep).to_radians(),
+        };
+        let mut trail = drawing::Trail::default();
+        let mut packed: drawing::Strokes = all.iter().cloned().collect();
+        for first in [arc.eval(0.0), at(cx + dx, cy + dy)] {
+            trail.begin(first);
+            trail.push(&Segment::Arc(arc));
+            packed.push_trail(Pen(9), Span::default(), &trail, Some(pitch));
+            let mut stroke = Stroke::new(Pen(9), first, Span::default());
+            stroke.arc(arc);
+            all.push(stroke);
+            let mut closed = Stroke::new(Pen(9), first, Span::default());
+            closed.arc_to(arc, first);
+            packed.push(&closed);
+            all.push(closed);
+        }
+        prop_assert_eq!(packed.len(), all.len());
+        for map in maps {
+            packed.transform(map);
+            for stroke in &mut all {
+                stroke.transform(map);
+            }
+        }
+        prop_assert_eq!(&packed.to_vec(), &all);
+        prop_assert_eq!(&packed.clone().into_iter().collect::<Vec<_>>(), &all);
+        for index in 0..=all.len() {
+            prop_assert_eq!(packed.get(index), all.get(index).cloned());
+        }
+        packed.shift_sources(5);
+        packed.change_pens(|pen| (pen != Pen(1)).then_some(Pen(pen.0 + 1)));
+        all.retain(|stroke| stroke.pen != Pen(1));
+        for stroke in &mut all {
+            stroke.pen.0 += 1;
+            let Span { start, end } = stroke.source();
+            stroke.set_source(Span { start: start + 5, end: end + 5 });
+        }
+        prop_assert_eq!(packed.len(), all.len());
+        prop_assert_eq!(&packed.to_vec(), &all);
+        packed.append(drawing::Strokes::from(all.clone()));
+        prop_assert_eq!(packed.to_vec(), [all.clone(), all].concat());
+    }
+
+    #[test]
+    fn loose_box_contains_the_bounding_box(s in segment()) {
+        prop_assert_eq!(s.loose_box().union(s.bounding_box()), s.loose_box());
+    }
+
+    #[test]
     fn chords_stay_within_the_tolerance(s in segment(), tolerance in 0.01..2.0f64) {
         let mut from = s.start();
         let count = s.chord_count(tolerance);

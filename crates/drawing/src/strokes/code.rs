@@ -170,7 +170,7 @@ fn write_arc(arc: &EllipticArc, [start, end]: [Point; 2], pitch: Option<Pitch>, 
         numbers.for_each(|number| code.extend(number.to_le_bytes()));
     }
     let is_left = is(b.to_point(), left_of(a).to_point());
-    if set(ArcFlags::LEFT, is_left) && set(ArcFlags::RIGHT, is(b.to_point(), (-left_of(a)).to_point())) {
+    if set(ArcFlags::LEFT, is_left) && set(ArcFlags::RIGHT, is(b.to_point(), right_of(a).to_point())) {
         write_point(b.to_point(), code);
     }
     if set(ArcFlags::FROM_ZERO, start_rad.to_bits() == 0) {
@@ -205,7 +205,7 @@ fn read_arc(reader: &mut Reader<'_>) -> Option<Path> {
     let b = if has(ArcFlags::LEFT) {
         left_of(a)
     } else if has(ArcFlags::RIGHT) {
-        -left_of(a)
+        right_of(a)
     } else {
         reader.point()?.to_vec2()
     };
@@ -264,9 +264,14 @@ fn read_free(reader: &mut Reader<'_>) -> Option<Path> {
     (vertices.len() == count && count > 0).then(|| Path::Free(Box::new(Trail { vertices, curves })))
 }
 
-/// A vector, a quarter turn counterclockwise.
+/// A vector, a quarter turn counterclockwise. The difference makes zeros positive, as maps do.
 fn left_of(v: Vec2) -> Vec2 {
-    Vec2::new(-v.y, v.x)
+    Vec2::new(0.0 - v.y, v.x)
+}
+
+/// A vector, a quarter turn clockwise.
+fn right_of(v: Vec2) -> Vec2 {
+    Vec2::new(v.y, 0.0 - v.x)
 }
 
 /// Whether two points have the same bits.

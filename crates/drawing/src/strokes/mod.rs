@@ -34,14 +34,18 @@ pub trait Lettering: fmt::Debug + Send + Sync {
 /// all of them. A consumer that needs them in any order collects them into a `Vec`.
 #[derive(Clone, Default)]
 pub struct Strokes {
-    /// Entries, each a header and a body.
-    code: Vec<u8>,
+    /// Entries, each a header and a body, in lists of about [`CHUNK`] bytes: one list would be copied
+    /// when it grows.
+    chunks: Vec<Vec<u8>>,
     /// The number of strokes: labels have several.
     len: usize,
     letterings: Vec<Arc<dyn Lettering>>,
     /// Maps of all strokes, applied one after the other: a product would round differently.
     maps: Vec<Affine>,
 }
+
+/// A list of entries of this length gets no more, bytes.
+const CHUNK: usize = 1 << 16;
 
 /// What all entries begin with.
 #[derive(Clone, Copy, Debug)]
@@ -81,11 +85,6 @@ impl Header {
 }
 
 impl Strokes {
-    /// No strokes, with room for that many bytes of them.
-    pub fn with_capacity(bytes: usize) -> Self {
-        Self { code: Vec::with_capacity(bytes), ..Self::default() }
-    }
-
     /// The number of strokes.
     pub fn len(&self) -> usize {
         self.len
@@ -127,9 +126,7 @@ impl Strokes {
     /// Appends a stroke.
     pub fn push(&mut self, stroke: &Stroke) {
         self.apply_maps();
-        let at = self.open(stroke.pen, stroke.source);
-        let kind = code::write(&stroke.path, &mut self.code);
-        self.close(at, kind, 1);
+        self.add(stroke.pen, stroke.source, 1, |code| code::write(&stroke.path, code));
     }
 
     /// Appends a stroke along a trail; none without vertices. Coordinates that are multiples of
@@ -140,9 +137,7 @@ impl Strokes {
             return;
         }
         self.apply_maps();
-        let at = self.open(pen, packed(source));
-        let kind = code::write_trail(trail, pitch, &mut self.code);
-        self.close(at, kind, 1);
+        self.add(pen, packed(source), 1, |code| code::write_trail(trail, pitch, code));
     }
 
     /// Appends a label: `strokes` strokes that `lettering` makes of `text`. The lettering of the label
@@ -162,9 +157,11 @@ impl Strokes {
         if !self.letterings.last().is_some_and(|last| Arc::ptr_eq(last, lettering)) {
             self.letterings.push(Arc::clone(lettering));
         }
-        let at = self.open(pen, packed(source));
-        code::write_label(self.letterings.len() as u32 - 1, strokes, text, &mut self.code);
-        self.close(at, Kind::Label, strokes as usize);
+        let index = self.letterings.len() as u32 - 1;
+        self.add(pen, packed(source), strokes as usize, |code| {
+            code::write_label(index, strokes, text, code);
+            Kind::Label
+        });
     }
 
     /// Maps every point. Takes constant time.
@@ -174,29 +171,33 @@ impl Strokes {
 
     /// Gives strokes other pens, and drops those whose pen becomes `None`.
     pub fn change_pens(&mut self, mut pen: impl FnMut(Pen) -> Option<Pen>) {
-        let (mut from, mut to) = (0, 0);
-        while let Some(header) = Header::read(&self.code[from..]) {
-            let next = from + HEADER + header.bytes;
-            if let Some(Pen(number)) = pen(header.pen) {
-                self.code.copy_within(from..next, to);
-                self.code[to + PEN..to + PEN + 2].copy_from_slice(&number.to_le_bytes());
-                to += next - from;
-            } else {
-                self.len -= header.strokes(&self.code[from + HEADER..next]);
+        for code in &mut self.chunks {
+            let (mut from, mut to) = (0, 0);
+            while let Some(header) = Header::read(&code[from..]) {
+                let next = from + HEADER + header.bytes;
+                if let Some(Pen(number)) = pen(header.pen) {
+                    code.copy_within(from..next, to);
+                    code[to + PEN..to + PEN + 2].copy_from_slice(&number.to_le_bytes());
+                    to += next - from;
+                } else {
+                    self.len -= header.strokes(&code[from + HEADER..next]);
+                }
+                from = next;
             }
-            from = next;
+            code.truncate(to);
         }
-        self.code.truncate(to);
     }
 
     /// Shifts the sources of all strokes: they begin `offset` bytes later.
     pub fn shift_sources(&mut self, offset: usize) {
         let offset = u32::try_from(offset).unwrap_or(u32::MAX);
-        let mut at = 0;
-        while let Some(header) = Header::read(&self.code[at..]) {
-            let start = header.source[0].saturating_add(offset);
-            self.code[at + SOURCE..at + SOURCE + 4].copy_from_slice(&start.to_le_bytes());
-            at += HEADER + header.bytes;
+        for code in &mut self.chunks {
+            let mut at = 0;
+            while let Some(header) = Header::read(&code[at..]) {
+                let start = header.source[0].saturating_add(offset);
+                code[at + SOURCE..at + SOURCE + 4].copy_from_slice(&start.to_le_bytes());
+                at += HEADER + header.bytes;
+            }
         }
     }
 
@@ -222,37 +223,40 @@ impl Strokes {
 
     /// Releases memory reserved for further strokes.
     pub fn shrink_to_fit(&mut self) {
-        self.code.shrink_to_fit();
+        self.chunks.last_mut().into_iter().for_each(Vec::shrink_to_fit);
         self.letterings.shrink_to_fit();
     }
 
     /// Calls `to` with every entry.
     fn entries(&self, mut to: impl FnMut(Header, &[u8])) {
-        let mut at = 0;
-        while let Some(header) = Header::read(&self.code[at..]) {
-            let body = at + HEADER;
-            at = body + header.bytes;
-            to(header, &self.code[body..at]);
+        for code in &self.chunks {
+            let mut at = 0;
+            while let Some(header) = Header::read(&code[at..]) {
+                let body = at + HEADER;
+                at = body + header.bytes;
+                to(header, &code[body..at]);
+            }
         }
     }
 
-    /// Begins an entry; [`Self::close`] completes its header.
+    /// Appends an entry of that many strokes; `body` appends its body and returns its kind.
     #[inline]
-    fn open(&mut self, pen: Pen, source: [u32; 2]) -> usize {
-        let at = self.code.len();
+    fn add(&mut self, pen: Pen, source: [u32; 2], strokes: usize, body: impl FnOnce(&mut Vec<u8>) -> Kind) {
+        // The first list grows as it is filled: most drawings are small.
+        if self.chunks.last().is_none_or(|chunk| chunk.len() >= CHUNK) {
+            let room = if self.chunks.is_empty() { 0 } else { CHUNK + CHUNK / 16 };
+            self.chunks.push(Vec::with_capacity(room));
+        }
+        let Some(code) = self.chunks.last_mut() else { return };
+        let at = code.len();
         let mut header = [0; HEADER];
         header[PEN..SOURCE].copy_from_slice(&pen.0.to_le_bytes());
         header[SOURCE..SOURCE + 4].copy_from_slice(&source[0].to_le_bytes());
         header[SOURCE + 4..BYTES].copy_from_slice(&source[1].to_le_bytes());
-        self.code.extend_from_slice(&header);
-        at
-    }
-
-    #[inline]
-    fn close(&mut self, at: usize, kind: Kind, strokes: usize) {
-        let bytes = (self.code.len() - at - HEADER) as u32;
-        self.code[at] = kind as u8;
-        self.code[at + BYTES..at + HEADER].copy_from_slice(&bytes.to_le_bytes());
+        code.extend_from_slice(&header);
+        code[at] = body(code) as u8;
+        let bytes = (code.len() - at - HEADER) as u32;
+        code[at + BYTES..at + HEADER].copy_from_slice(&bytes.to_le_bytes());
         self.len += strokes;
     }
 
@@ -296,7 +300,8 @@ enum Made {
 /// A position in a list of strokes.
 #[derive(Clone, Debug, Default)]
 struct Cursor {
-    /// The next entry.
+    /// The list of the next entry, and where it begins there.
+    chunk: usize,
     at: usize,
     /// What is left of the label before it.
     label: std::vec::IntoIter<Stroke>,
@@ -305,15 +310,26 @@ struct Cursor {
 }
 
 impl Cursor {
+    /// The next entry with its body.
+    fn entry<'a>(&mut self, strokes: &'a Strokes) -> Option<(Header, &'a [u8])> {
+        loop {
+            let code = strokes.chunks.get(self.chunk)?;
+            if let Some(header) = Header::read(&code[self.at..]) {
+                let body = self.at + HEADER;
+                return Some((header, &code[body..body + header.bytes]));
+            }
+            (self.chunk, self.at) = (self.chunk + 1, 0);
+        }
+    }
+
     fn next(&mut self, strokes: &Strokes) -> Option<Stroke> {
         let stroke = loop {
             if let Some(stroke) = self.label.next() {
                 break stroke;
             }
-            let header = Header::read(&strokes.code[self.at..])?;
-            let body = self.at + HEADER;
-            self.at = body + header.bytes;
-            match strokes.expand(header, &strokes.code[body..self.at]) {
+            let (header, body) = self.entry(strokes)?;
+            self.at += HEADER + body.len();
+            match strokes.expand(header, body) {
                 Made::One(Some(stroke)) => break stroke,
                 Made::One(None) => {}
                 Made::Label(label) => self.label = label.into_iter(),
@@ -326,14 +342,12 @@ impl Cursor {
     /// Skips up to `count` strokes, and makes the one after them.
     fn nth(&mut self, strokes: &Strokes, mut count: usize) -> Option<Stroke> {
         while count > 0 && self.label.len() == 0 {
-            let header = Header::read(&strokes.code[self.at..])?;
-            let body = self.at + HEADER;
-            let next = body + header.bytes;
-            let skipped = header.strokes(&strokes.code[body..next]);
+            let (header, body) = self.entry(strokes)?;
+            let skipped = header.strokes(body);
             if skipped > count {
                 break;
             }
-            self.at = next;
+            self.at += HEADER + body.len();
             self.made += skipped;
             count -= skipped;
         }
@@ -379,7 +393,13 @@ impl Iterator for IntoIter {
     type Item = Stroke;
 
     fn next(&mut self) -> Option<Stroke> {
-        self.cursor.next(&self.strokes)
+        let before = self.cursor.chunk;
+        let stroke = self.cursor.next(&self.strokes);
+        // What has been read is not needed any more.
+        for read in before..self.cursor.chunk {
+            self.strokes.chunks[read] = Vec::new();
+        }
+        stroke
     }
 
     fn nth(&mut self, count: usize) -> Option<Stroke> {

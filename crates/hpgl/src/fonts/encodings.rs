@@ -282,6 +282,9 @@ pub(crate) struct Mark {
 impl Mark {
     /// The mark that a character is, if it is one.
     pub(crate) fn of(character: char) -> Option<Self> {
+        if character < GRAVE {
+            return None;
+        }
         let &(mark, sign, _) = MARKS.iter().find(|mark| mark.0 == character)?;
         Some(Self { sign, width: if mark == DOUBLE_TILDE { 2 } else { 1 }, above: mark != LOW_LINE })
     }

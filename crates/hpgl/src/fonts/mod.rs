@@ -3,6 +3,8 @@
 mod encodings;
 mod newstroke;
 
+use std::sync::LazyLock;
+
 pub(crate) use encodings::{CharacterSet, Mark, compose};
 
 /// Height of capitals, units of the font.
@@ -50,6 +52,37 @@ impl Glyph {
         self.strokes.split(' ').filter(|stroke| !stroke.is_empty()).map(move |stroke| {
             stroke.as_bytes().chunks_exact(2).map(move |pair| (unit(pair[0]), unit(pair[1])))
         })
+    }
+}
+
+/// A glyph and what its ink takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Measured {
+    pub(crate) glyph: Glyph,
+    pub(crate) strokes: u32,
+    /// Its ink is no farther from its origin, in character widths along x and in capital heights along
+    /// y, in its cell or not.
+    pub(crate) reach: f64,
+}
+
+impl Measured {
+    fn of(character: char) -> Option<Self> {
+        let glyph = Glyph::of(character).filter(|_| Mark::of(character).is_none())?;
+        let shift = (0.5 * (BODY_WIDTH - glyph.advance)).abs();
+        let reach = |(x, y): (f64, f64)| f64::max((x.abs() + shift) / BODY_WIDTH, y.abs() / CAP_HEIGHT);
+        let reach = glyph.strokes().flatten().map(reach).fold(0.0, f64::max);
+        Some(Self { glyph, strokes: glyph.strokes().count() as u32, reach })
+    }
+}
+
+/// The glyph of a character that stands by itself, if the font has it.
+pub(crate) fn measured(character: char) -> Option<Measured> {
+    /// Most labels have no other characters.
+    static LATIN_1: LazyLock<[Option<Measured>; 256]> =
+        LazyLock::new(|| std::array::from_fn(|code| Measured::of(char::from(code as u8))));
+    match u8::try_from(u32::from(character)) {
+        Ok(code) => LATIN_1[usize::from(code)],
+        Err(_) => Measured::of(character),
     }
 }
 

@@ -1,10 +1,11 @@
 //! Arcs, circles, wedges, rectangles and curves. Their mathematics is done in current units, where
 //! a circle is a circle whatever the scale does to it afterwards.
 
-use drawing::{CubicBez, EllipticArc, Line, Point, Segment, Vec2};
+use drawing::{CubicBez, EllipticArc, Line, Point, Rect, Segment, Vec2};
 
 use super::Interpreter;
 use crate::codes;
+use crate::units::SANE_PLU;
 
 /// The chord angle of arcs that name none, degrees.
 const DEFAULT_CHORD: f64 = 5.0;
@@ -38,7 +39,6 @@ fn without_idle_turns(sweep: f64) -> f64 {
 /// An arc about a centre: smooth, or in chords of an angle (degrees).
 fn arc(center: Point, from: Point, sweep: f64, chord: Option<f64>) -> Vec<Segment> {
     let radius = from - center;
-    let end = center + turned(radius, sweep);
     match chord {
         None => vec![Segment::Arc(EllipticArc {
             center,
@@ -49,6 +49,7 @@ fn arc(center: Point, from: Point, sweep: f64, chord: Option<f64>) -> Vec<Segmen
         })],
         Some(chord) => {
             let count = (sweep.abs() / chord).ceil().max(1.0) as usize;
+            let end = center + turned(radius, sweep);
             let mut at = from;
             (1..=count)
                 .map(|step| {
@@ -138,10 +139,16 @@ impl Interpreter {
     }
 
     fn is_sane_path(&mut self, path: &[Segment]) -> bool {
+        let corners = |bounds: Rect| [Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)];
         path.iter().all(|segment| {
-            let bounds = segment.bounding_box();
-            let corners = [Point::new(bounds.x0, bounds.y0), Point::new(bounds.x1, bounds.y1)];
-            corners.into_iter().all(|corner| {
+            let near = |corner: Point| {
+                let corner = self.frame.plu_of_user(corner);
+                corner.x.abs() < SANE_PLU && corner.y.abs() < SANE_PLU
+            };
+            if corners(segment.loose_box()).into_iter().all(near) {
+                return true;
+            }
+            corners(segment.bounding_box()).into_iter().all(|corner| {
                 let corner = self.frame.plu_of_user(corner);
                 self.is_sane(corner)
             })

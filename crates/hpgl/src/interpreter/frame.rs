@@ -252,6 +252,11 @@ impl Frame {
         self.plu_to_mm * p
     }
 
+    /// The map from plotter units to millimetres on the page.
+    pub(crate) fn plu_to_mm(&self) -> Affine {
+        self.plu_to_mm
+    }
+
     /// The map from current units to millimetres on the page.
     pub(crate) fn user_to_mm(&self) -> Affine {
         self.user_to_mm

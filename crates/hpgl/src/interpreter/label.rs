@@ -4,8 +4,9 @@ use drawing::{Point, Span, Vec2};
 
 use super::Interpreter;
 use super::characters::{CELL, Shape};
+use super::lettering;
 use crate::codes;
-use crate::fonts::{BODY_WIDTH, CAP_HEIGHT, Glyph, Mark, compose};
+use crate::fonts::{BODY_WIDTH, Glyph, Mark, compose};
 
 /// The grid that `UC` draws on: units in a character's width and height. A cell has 6 by 16 of
 /// them.
@@ -86,30 +87,14 @@ impl Interpreter {
         composed(letters)
     }
 
-    fn is_proportional(&self) -> bool {
-        let characters = &self.characters;
-        let font = if characters.alternate_selected { characters.alternate } else { characters.standard };
-        font.proportional
-    }
-
     /// The advance of a character along the base line, in widths.
     fn advance(&self, character: char) -> f64 {
-        let cell = match Glyph::of(character) {
-            Some(glyph) if self.is_proportional() => glyph.advance / BODY_WIDTH,
-            _ => CELL.x,
-        };
-        cell + CELL.x * self.characters.extra.x
+        self.spacing().advance(Glyph::of(character))
     }
 
     /// From one character to the next: along the text path.
     fn advance_step(&self, character: char, shape: &Shape) -> Vec2 {
-        let line = CELL.y * (1.0 + self.characters.extra.y);
-        match self.characters.path {
-            1 => shape.step(0.0, -line),
-            2 => shape.step(-self.advance(character), 0.0),
-            3 => shape.step(0.0, line),
-            _ => shape.step(self.advance(character), 0.0),
-        }
+        self.spacing().step(Glyph::of(character), shape)
     }
 
     /// From one line to the next: a quarter turn clockwise from the text path.
@@ -167,6 +152,9 @@ impl Interpreter {
     fn line_of_text(&mut self, line: &[Letter], shape: &Shape) {
         let shift = self.justification(line, shape);
         self.set_pen_position(self.position + shift);
+        if self.hold_label(line.iter().map(|letter| letter.character), shape) {
+            return;
+        }
         let mut before = ' ';
         for letter in line {
             match letter.character {
@@ -218,10 +206,7 @@ impl Interpreter {
             });
             return;
         };
-        // In cells of one width glyphs stand in the middle of their body; slanted rows and narrow
-        // letters stay apart.
-        let shift = if self.is_proportional() { 0.0 } else { 0.5 * (BODY_WIDTH - glyph.advance) };
-        self.glyph(glyph, shape, self.position, shift, 0.0);
+        self.glyph(glyph, shape, self.position, self.spacing().shift(glyph), 0.0);
     }
 
     /// Draws a mark on the character before the pen, which stays where it is.
@@ -247,8 +232,8 @@ impl Interpreter {
         let dashes = self.tracer.swap_dashes(None);
         for stroke in glyph.strokes() {
             let mut from = None;
-            for (x, y) in stroke {
-                let at = shape.at(origin, (x + shift_x) / BODY_WIDTH, (y + shift_y) / CAP_HEIGHT);
+            for point in stroke {
+                let at = lettering::place(shape, origin, point, (shift_x, shift_y));
                 if !self.is_sane(at) {
                     break;
                 }

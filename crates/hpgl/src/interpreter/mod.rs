@@ -5,6 +5,7 @@ mod characters;
 mod fill;
 mod frame;
 mod label;
+mod lettering;
 mod line_type;
 mod pages;
 mod pens;
@@ -14,7 +15,9 @@ mod ticks;
 mod tracer;
 mod travel;
 
-use drawing::{Drawing, Pen, Point, Span};
+use std::sync::Arc;
+
+use drawing::{Drawing, Lettering, Pen, Point, Span};
 
 use crate::codes;
 use crate::codes::Code;
@@ -29,6 +32,7 @@ use characters::Characters;
 use fill::FillType;
 use frame::Frame;
 pub(crate) use frame::PageAxes;
+use lettering::Style;
 use line_type::LineType;
 use pens::Pens;
 use polygon::Polygon;
@@ -105,6 +109,9 @@ pub(crate) struct Interpreter {
     margin: Point,
     /// Where the last label left the pen: if it is elsewhere, it has moved since.
     label_end: Option<Point>,
+    /// The lettering of the last label, and room for its text.
+    lettering: Option<(Style, Arc<dyn Lettering>)>,
+    label_text: Vec<u8>,
     /// What `BL` kept, and where it stands in the file.
     label_buffer: (Vec<u8>, usize),
     /// The last `SC` while nothing was drawn with it: its bytes, number and pen position.
@@ -130,7 +137,7 @@ impl Interpreter {
         let pieces = BASE_SEGMENT_BUDGET + SEGMENTS_PER_BYTE * length as u64;
         let frame = Frame::new(options, page_axes);
         let position_mm = frame.mm_of_plu(Point::ZERO);
-        let mut tracer = Tracer::new(pieces as f64, options.plotter_unit_mm, length);
+        let mut tracer = Tracer::new(pieces as f64, options.plotter_unit_mm);
         tracer.set_clip(frame.clip());
         Self {
             frame,
@@ -149,6 +156,8 @@ impl Interpreter {
             pens: Pens::default(),
             margin: Point::ZERO,
             label_end: None,
+            lettering: None,
+            label_text: Vec::new(),
             label_buffer: (Vec::new(), 0),
             unsettled_scale: None,
             symbol: None,

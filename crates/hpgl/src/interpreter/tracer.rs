@@ -1,13 +1,15 @@
 //! The pen on the paper: joins pen-down movement to strokes, clipped to the window; mm.
 
-use drawing::{Line, Pen, Pitch, Point, Rect, Segment, Span, Strokes, Trail, clip_segment};
+use std::sync::Arc;
+
+use drawing::{Lettering, Line, Pen, Pitch, Point, Rect, Segment, Span, Strokes, Trail, clip_segment};
 
 use super::line_type::{Dash, Dashes};
 
 /// Steps shorter than this (mm) are rounding, not movement.
 const NO_STEP: f64 = 1e-9;
 
-fn same(a: Point, b: Point) -> bool {
+pub(crate) fn same(a: Point, b: Point) -> bool {
     (a.x - b.x).abs() < NO_STEP && (a.y - b.y).abs() < NO_STEP
 }
 
@@ -37,13 +39,10 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
-    /// A tracer that draws at most `dashes` dashes; `unit_mm` is the plotter unit, `length` the
-    /// size of the file in bytes.
-    pub(crate) fn new(dashes_left: f64, unit_mm: f64, file_bytes: usize) -> Self {
+    /// A tracer that draws at most `dashes_left` dashes; `unit_mm` is the plotter unit.
+    pub(crate) fn new(dashes_left: f64, unit_mm: f64) -> Self {
         Self {
-            // Strokes of most files take no more bytes than their text. Memory is only committed when
-            // used; growing would copy.
-            strokes: Strokes::with_capacity(file_bytes),
+            strokes: Strokes::default(),
             pitch: Pitch::from_mm(unit_mm),
             pen: Pen(1),
             command: Span::default(),
@@ -228,6 +227,17 @@ impl Tracer {
         self.connect(segment.start());
         self.trail.push(segment);
         self.source.end = self.command.end;
+    }
+
+    /// Whether a point is kept by the clip.
+    pub(crate) fn keeps(&self, at: Point) -> bool {
+        self.clip.is_none_or(|clip| holds(clip, at))
+    }
+
+    /// A label of that many strokes, all of them within the clip.
+    pub(crate) fn label(&mut self, lettering: &Arc<dyn Lettering>, text: &[u8], strokes: u32) {
+        self.finish();
+        self.strokes.push_label(self.pen, self.command, lettering, text, strokes);
     }
 
     /// Lifts the pen: what was drawn is a stroke.
