@@ -97,7 +97,7 @@ fn check_makes_nothing_and_says_what_changed() {
     let (_, said) = project.exits(1, "build --check");
     assert!(said.contains("out/a.ticks: 1 stroke differ") && said.contains("1 added"), "{said}");
     assert!(said.contains("(a.hpgl changed)") && said.contains("out/b.csv: is not there"), "{said}");
-    assert!(said.contains("3 of the outputs are not what plotplan.toml makes"), "{said}");
+    assert!(said.contains("error: 3 outputs are not what plotplan.toml makes: `plotplan build`"), "{said}");
     assert_eq!(project.0.text("out/a.ticks"), before);
     assert!(!project.0.path().join("out/b.csv").exists());
 
@@ -115,7 +115,7 @@ fn failed_output_names_its_drawing_and_the_others_are_made() {
     let (_, said) = project.exits(1, "build");
     assert!(said.contains("a.hpgl:1:") && said.contains("out/a.ticks: not made"), "{said}");
     assert!(
-        said.contains("1 built, 2 failed") && said.contains("2 of the outputs could not be made"),
+        said.contains("1 built, 2 failed") && said.contains("error: 2 outputs could not be made\n"),
         "{said}"
     );
     assert_eq!(project.files("out"), ["b.csv"]);
@@ -125,6 +125,55 @@ fn failed_output_names_its_drawing_and_the_others_are_made() {
     assert!(said.contains("cannot read a.hpgl") && said.contains("1 built, 2 failed"), "{said}");
     project.0.write("a.hpgl", "IN;SP1;PU0,0;PD400,0;PU;");
     assert!(project.exits(0, "build").1.ends_with("2 built, 1 up to date\n"));
+}
+
+#[test]
+fn check_counts_failed_and_different_outputs_apart() {
+    let project = Project::new(TWO);
+    project.exits(0, "build");
+    project.0.write("a.hpgl", "IN;SP1;PU0,0;PD400000,0;PU;");
+    project.0.write("b.hpgl", "IN;SP1;PU1000,1000;CI500;PU;SP0;");
+    let (_, said) = project.exits(1, "build --check");
+    assert!(
+        said.contains("error: 2 outputs could not be made; 1 output is not what plotplan.toml makes:"),
+        "{said}"
+    );
+}
+
+#[test]
+fn report_of_a_build_has_findings_errors_and_places() {
+    let project = Project::new(TWO);
+    project.0.write("a.hpgl", "IN;SP1;PU0,0;PD400000,0;PU;");
+    project.0.write("b.hpgl", "IN;SP1;QA;PU1000,1000;CI400;PU;SP0;");
+    let (_, said) = project.exits(1, "build --report json");
+    let report: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    let built = &report["built"];
+    assert_eq!(
+        [&built[0]["state"], &built[0]["error"]["code"], &built[0]["error"]["place"]["file"]],
+        ["failed", "out-of-reach", "a.hpgl"],
+        "{built}"
+    );
+    assert_eq!([&built[2]["state"], &built[2]["error"]], [&"built".into(), &serde_json::Value::Null]);
+    let found = report["diagnostics"].as_array().unwrap();
+    assert!(found.iter().any(|finding| finding["file"] == "b.hpgl" && finding["byte"] == 7), "{found:?}");
+    assert_eq!(report["error"]["place"]["file"], "a.hpgl");
+
+    // A file that is missing is found before any process starts.
+    std::fs::remove_file(project.0.path().join("a.hpgl")).unwrap();
+    let (_, said) = project.exits(1, "build --report json");
+    let report: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    assert_eq!(report["built"][0]["error"]["code"], "io", "{said}");
+}
+
+#[test]
+fn quiet_build_prints_errors_only() {
+    let project = Project::new(TWO);
+    project.0.write("b.hpgl", "IN;SP1;QA;PU1000,1000;CI400;PU;SP0;");
+    assert!(project.exits(0, "build").1.contains("warning"));
+    assert_eq!(project.exits(0, "build --force --quiet").1, "");
+    assert_eq!(project.exits(0, "build --check --quiet").1, "");
+    let lines = project.exits(0, "build --force --message-format json").1;
+    assert!(lines.contains("{\"file\":\"b.hpgl\""), "{lines}");
 }
 
 #[test]
@@ -242,6 +291,15 @@ fn diff_names_strokes_quantities_and_causes() {
         "{said}"
     );
     assert!(!said.contains("machine."), "{said}");
+    // Of the certificates: how close the ink is, and how close the motors are to their limits.
+    for name in ["stray    ", "missed   "] {
+        let line = said.lines().find(|line| line.starts_with(name)).unwrap_or_default();
+        assert!(line.contains(" mm -> "), "{name}: {said}");
+    }
+    let (report, _) = project.exits(0, "diff old.json new.json --json");
+    for key in ["speed_share", "acceleration_share"] {
+        assert!(report.contains(&format!("{{\"key\":\"{key}\",\"old\":0.")), "{report}");
+    }
     assert_eq!(project.exits(0, "diff old.json old.json --exit-code").0, "no difference\n");
 
     // A plan is its drawing; a plan document states more than tick lines.
@@ -253,6 +311,13 @@ fn diff_names_strokes_quantities_and_causes() {
             "{said}"
         );
     }
+    // The placement is rounded to what it means.
+    project.exits(0, "convert a.hpgl -m coaxial -o other.ticks --fit --rotate 90");
+    let (said, _) = project.exits(0, "diff old.ticks other.ticks");
+    let placement = said.lines().find(|line| line.starts_with("placement: ")).unwrap_or_default();
+    let digits =
+        |word: &str| word.split_once('.').map_or(0, |(_, after)| after.trim_end_matches([',', ']']).len());
+    assert!(!placement.is_empty() && placement.split(' ').all(|word| digits(word) <= 6), "{said}");
 
     let (machine, _) = project.exits(0, "machine show coaxial");
     project.0.write("fast.toml", machine.replace("60deg/s", "90deg/s"));
@@ -270,6 +335,20 @@ fn diff_names_strokes_quantities_and_causes() {
 }
 
 #[test]
+fn diff_finds_one_vertex_that_moved() {
+    let project = Project::new(TWO);
+    let drawing = |y: i32| {
+        let points: Vec<String> =
+            (1..200).map(|k| format!("{},{}", 20 * k, if k == 77 { y } else { 40 * (k % 9) })).collect();
+        format!("IN;SP1;PU0,0;PD{};PU;", points.join(","))
+    };
+    project.0.write("old.hpgl", drawing(200));
+    project.0.write("new.hpgl", drawing(240));
+    let (said, _) = project.exits(1, "diff old.hpgl new.hpgl --exit-code");
+    assert!(said.starts_with("strokes  0 the same, 1 gone, 1 added\n"), "{said}");
+}
+
+#[test]
 fn diff_pictures_and_report() {
     let project = Project::new(TWO);
     for (name, head) in [("d.svg", "<svg"), ("d.html", "<!DOCTYPE html>"), ("d.png", "\u{fffd}PNG")] {
@@ -277,6 +356,8 @@ fn diff_pictures_and_report() {
         let bytes = project.0.bytes(name);
         assert!(String::from_utf8_lossy(&bytes).starts_with(head), "{name}");
     }
+    let svg = project.0.text("d.svg");
+    assert!(svg.contains(">gone</text>") && svg.contains(">added</text>") && !svg.contains(">pen "), "{svg}");
     project.exits(2, "diff a.hpgl b.hpgl -o d.gif");
     let (_, said) = project.exits(2, "diff a.hpgl b.hpgl -o a.svg.hpgl");
     assert!(said.contains("NAME.svg"), "{said}");

@@ -278,42 +278,49 @@ fn compared(plans: &BTreeMap<&str, Plans>) -> Result<()> {
     Ok(())
 }
 
-/// Files whose mutants are tested, and the tests that must kill them.
-const MUTATED: &[(&str, &[&str])] = &[
-    ("plotplan-kinematics", &["crates/kinematics/src/**/*.rs"]),
-    ("plotplan-verify", &["crates/verify/src/**/*.rs"]),
-    ("plotplan-planner", &["crates/planner/src/time_parametrization/**/*.rs"]),
+/// Packages whose tests must kill the mutants of files.
+const MUTATED: &[(&str, &str)] = &[
+    ("plotplan-kinematics", "crates/kinematics/src/**/*.rs"),
+    ("plotplan-verify", "crates/verify/src/**/*.rs"),
+    ("plotplan-planner", "crates/planner/src/time_parametrization/**/*.rs"),
 ];
 
-/// Tests one share of the mutants of each crate by that crate's own tests: a sixtieth at 100 %, another one
-/// with each seed. All of them take a day.
+/// Tests one share of the mutants, each by the tests of its own crate: a sixtieth at 100 %, another one with
+/// each seed. All of them take a day. One run for all crates, so that what they depend on is built once;
+/// little optimization, because a mutant is built for each of a few seconds of tests.
 fn mutants(scale: Scale) -> Result<()> {
     const SHARES: u64 = 60;
     ensure!(has_mutants(), "cargo install cargo-mutants --locked");
     let shards = (SHARES * 100 / scale.percent.max(1)).max(1);
     let out = crate::top().join("target/mutants");
-    let mut survivors = 0;
+    let mut command = Command::new("cargo");
+    command.args(["mutants", "--profile", "test", "--jobs", "1", "--no-times", "--colors", "never"]);
+    command.args(["--shard", &format!("{}/{shards}", scale.seed % shards), "--sharding", "round-robin"]);
+    command.args(["--timeout", "300", "--baseline", "skip", "--output"]).arg(&out);
+    command.envs([("CARGO_INCREMENTAL", "1"), ("CARGO_PROFILE_TEST_DEBUG", "0")]);
+    command.envs([("CARGO_PROFILE_TEST_OPT_LEVEL", "1"), ("CARGO_PROFILE_DEV_DEBUG", "0")]);
     for (package, files) in MUTATED {
-        let mut command = Command::new("cargo");
-        command.args(["mutants", "--package", package, "--profile", "test", "--jobs", "1", "--no-times"]);
-        command.args(["--shard", &format!("{}/{shards}", scale.seed % shards)]);
-        command
-            .args(["--timeout", "300", "--baseline", "skip", "--colors", "never", "--output"])
-            .arg(out.join(package));
-        for file in *files {
-            command.args(["--file", file]);
-        }
-        println!("$ {command:?}");
-        let status = command.current_dir(crate::top()).status().context("cargo mutants")?;
-        // 2: some survived, 3: some timed out. Anything else is a failure of the tool.
-        ensure!(matches!(status.code(), Some(0 | 2 | 3)), "{package}: {status}");
-        let missed = out.join(package).join("mutants.out/missed.txt");
-        for line in std::fs::read_to_string(&missed).unwrap_or_default().lines() {
-            println!("survived: {line}");
-            survivors += 1;
-        }
+        command.args(["--package", package, "--file", files]);
     }
-    println!("{survivors} survivors, to be killed by a test or explained in docs/trust.md");
+    println!("$ {command:?}");
+    let status = command.current_dir(crate::top()).status().context("cargo mutants")?;
+    // 2: some survived, 3: some timed out. Anything else is a failure of the tool.
+    ensure!(matches!(status.code(), Some(0 | 2 | 3)), "{status}");
+    let lines = |name: &str| {
+        let text = std::fs::read_to_string(out.join("mutants.out").join(name)).unwrap_or_default();
+        text.lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let survivors = lines("missed.txt");
+    for line in &survivors {
+        println!("survived: {line}");
+    }
+    println!(
+        "{} killed, {} timed out, {} do not build, {} survived, to be killed by a test or explained in docs/trust.md",
+        lines("caught.txt").len(),
+        lines("timeout.txt").len(),
+        lines("unviable.txt").len(),
+        survivors.len()
+    );
     Ok(())
 }
 

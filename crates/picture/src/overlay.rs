@@ -1,6 +1,8 @@
 //! What a picture shows beside its ink: lines in colours of their own, the machine in a pose, and a
 //! key to the colours.
 
+use std::collections::BTreeMap;
+
 use drawing::Point;
 
 use crate::palette::Colour;
@@ -23,6 +25,8 @@ pub struct Overlay {
     pub machine: Option<MachinePose>,
     /// What the colours mean.
     pub key: Option<Key>,
+    /// Names of pens in the legend, in the place of their numbers.
+    pub pen_names: BTreeMap<u16, String>,
 }
 
 /// A line in a colour of its own.

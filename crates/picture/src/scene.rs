@@ -328,7 +328,13 @@ impl Legend {
             point(text, at + (0.0, 0.3 * self.size_mm));
             text.byte(b'h').fixed(1.2 * self.size_mm).str("\"/>\n");
             label(text, at + (1.7 * self.size_mm, 0.0));
-            text.str("pen ").int(pen).str("</text>\n");
+            match scene.overlay.pen_names.get(&pen) {
+                Some(name) => escaped(text, name),
+                None => {
+                    text.str("pen ").int(pen);
+                }
+            }
+            text.str("</text>\n");
         }
         if let Some(key) = &scene.overlay.key {
             let first = self.lines - key_lines(key) + 1;

@@ -50,17 +50,20 @@ impl Failure {
         }
     }
 
-    /// Reports the failure of one of several outputs, which does not end the command.
-    pub(crate) fn describe(self, name: &str) {
+    /// Reports the failure of one of several outputs, which does not end the command; `None` if it was
+    /// reported before.
+    pub(crate) fn describe(self, name: &str) -> Option<ErrorReport> {
         let (code, error) = match self {
-            Self::ClosedPipe | Self::Refused | Self::Interrupted => return,
+            Self::ClosedPipe | Self::Refused | Self::Interrupted => return None,
             Self::Drawing(error) => (kind_of(&error).unwrap_or(Code::Drawing), error),
             Self::Usage(error) => (usage_kind(&error), error),
             Self::Io(error) => (Code::Io, error),
         };
         let text = format!("{error:#}");
         let is_named = text.contains(name) || name.ends_with(text.split(':').next().unwrap_or(""));
-        terminal::error_of_one(code, &if is_named { text } else { format!("{name}: {text}") });
+        let message = if is_named { text } else { format!("{name}: {text}") };
+        terminal::error_of_one(code, &message);
+        Some(ErrorReport { code, message, help: None, place: place_of(&error) })
     }
 
     /// Prints and records the failure, unless that was done already; returns the exit code.

@@ -23,6 +23,17 @@ pub(crate) struct Style {
     pub(crate) report: ReportForm,
 }
 
+impl Style {
+    /// Options that give another run of the program the same messages.
+    pub(crate) fn as_arguments(self) -> Vec<String> {
+        let form = clap::ValueEnum::to_possible_value(&self.message_format);
+        let form = form.map(|form| format!("--message-format={}", form.get_name()));
+        let flags = [(self.quiet, "--quiet"), (self.all, "--all")];
+        let flags = flags.iter().filter(|(is_given, _)| *is_given).map(|(_, flag)| (*flag).to_owned());
+        form.into_iter().chain(flags).collect()
+    }
+}
+
 struct Session {
     style: Style,
     report: Option<Report>,

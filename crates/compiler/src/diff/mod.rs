@@ -114,10 +114,7 @@ impl Side {
             Quantity { key: "rows", value: header.rows as f64 },
         ];
         if let Some(document) = &plan.document {
-            for (key, path) in [("stray_max_mm", "/stray/max_mm"), ("missed_max_mm", "/missed/max_mm")] {
-                let value = document.certificate.pointer(path).and_then(serde_json::Value::as_f64);
-                quantities.extend(value.map(|value| Quantity { key, value }));
-            }
+            quantities.extend(certified(&document.certificate));
         }
         Self {
             name: name.to_owned(),
@@ -176,6 +173,22 @@ fn ink_quantities(drawing: &Drawing) -> Vec<Quantity> {
     ]
 }
 
+/// Distances and peaks of a plan document's certificate, a [`crate::report::CertificateReport`].
+fn certified(certificate: &serde_json::Value) -> Vec<Quantity> {
+    let distance = |path: &str| certificate["after_rounding"][path]["max_mm"].as_f64();
+    let motors = certificate["motors"].as_array().map_or(&[][..], Vec::as_slice);
+    let largest =
+        |of: &dyn Fn(&serde_json::Value) -> Option<f64>| motors.iter().filter_map(of).max_by(f64::total_cmp);
+    let all = [
+        ("stray_max_mm", distance("ink_to_drawing")),
+        ("missed_max_mm", distance("drawing_to_ink")),
+        ("speed_share", largest(&|motor| motor["speed_share"].as_f64())),
+        ("acceleration_share", largest(&|motor| motor["acceleration_share"].as_f64())),
+        ("jerk_share", largest(&|motor| motor["jerk"]["share"].as_f64())),
+    ];
+    all.into_iter().filter_map(|(key, value)| Some(Quantity { key, value: value? })).collect()
+}
+
 /// What a plan states of itself, less what is compared as a quantity.
 fn plan_facts(plan: &PlanFile) -> Facts {
     let header = &plan.table.header;
@@ -185,7 +198,7 @@ fn plan_facts(plan: &PlanFile) -> Facts {
     add("period_us", header.period_us.to_string());
     add("lift_overlap_us", header.lift_overlap_us.to_string());
     add("rounding", header.rounding.name().to_owned());
-    add("placement", format!("{:?}", header.placement));
+    add("placement", format!("{:?}", header.placement.map(|value| libm::round(value * 1e6) / 1e6)));
     for (index, motor) in header.motors.iter().enumerate() {
         facts.extend(limit_facts(index, &motor.name, &motor.limits));
     }
@@ -270,23 +283,13 @@ impl Diff {
         same_strokes && self.facts.is_empty() && self.quantities().iter().all(|(_, old, new)| old == new)
     }
 
-    /// Quantities of both sides: key, old, new; where only one side has it the other is `None`.
-    pub fn quantities(&self) -> Vec<(&'static str, Option<f64>, Option<f64>)> {
+    /// Quantities that both sides state: key, old, new.
+    pub fn quantities(&self) -> Vec<(&'static str, f64, f64)> {
         let value = |side: &Side, key: &str| {
             side.quantities.iter().find(|quantity| quantity.key == key).map(|quantity| quantity.value)
         };
-        let mut keys: Vec<&'static str> = self.old.quantities.iter().map(|quantity| quantity.key).collect();
-        for quantity in &self.new.quantities {
-            if !keys.contains(&quantity.key) {
-                keys.push(quantity.key);
-            }
-        }
-        let row = |key| (key, value(&self.old, key), value(&self.new, key));
-        let is_of_both = self.old.kind == self.new.kind;
-        keys.into_iter()
-            .map(row)
-            .filter(|(_, old, new)| is_of_both || (old.is_some() && new.is_some()))
-            .collect()
+        let row = |quantity: &Quantity| Some((quantity.key, quantity.value, value(&self.new, quantity.key)?));
+        self.old.quantities.iter().filter_map(row).collect()
     }
 }
 

@@ -43,11 +43,9 @@ pub fn scene(diff: &Diff) -> Scene {
     let first = points().next().copied().unwrap_or(Point::ZERO);
     let bounds = points().fold(Rect::from_points(first, first), |bounds, point| bounds.union_pt(*point));
     let colors: PenColors = CLASSES.iter().map(|(pen, _, color)| (*pen, *color)).collect();
+    let pen_names = CLASSES.iter().map(|(pen, name, _)| (*pen, (*name).to_owned())).collect();
     Scene {
-        title: format!(
-            "{} -> {}: grey same, orange gone, blue new, purple other pen",
-            diff.old.name, diff.new.name
-        ),
+        title: format!("{} -> {}", diff.old.name, diff.new.name),
         sheet: bounds,
         reach: Vec::new(),
         shades: None,
@@ -56,7 +54,7 @@ pub fn scene(diff: &Diff) -> Scene {
         colors,
         travel: Vec::new(),
         start: None,
-        overlay: picture::Overlay::default(),
+        overlay: picture::Overlay { pen_names, ..picture::Overlay::default() },
     }
 }
 

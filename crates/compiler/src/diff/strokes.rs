@@ -6,7 +6,8 @@ use drawing::{Affine, Point, Rect, Vec2};
 
 use crate::replay::Polyline;
 
-/// Points of a stroke whose distance from the other stroke is measured, beside its vertices' ends.
+/// Points spread along a stroke whose distance from the other stroke is measured, beside its vertices and the
+/// middles of its segments.
 const SAMPLES: usize = 32;
 /// Strokes with the same bounding box, or of the same size, that are compared with a stroke.
 const CANDIDATES: usize = 64;
@@ -41,9 +42,9 @@ pub struct Pair {
 
 impl Matching {
     /// Pairs the strokes of both sides, each at most once. Two strokes are the same if their bounding
-    /// boxes agree within `within_mm` and each lies within `within_mm` of the other at the sampled
-    /// points; where a closed line begins does not matter. A stroke is compared with at most
-    /// 64 others of its bounding box and as many of its size.
+    /// boxes agree within `within_mm` and each lies within `within_mm` of the other at its vertices, at the
+    /// middles of its segments and at 32 points spread along it; where a closed line begins does not matter.
+    /// A stroke is compared with at most 64 others of its bounding box and as many of its size.
     pub fn of(old: &[Polyline], new: &[Polyline], within_mm: f64) -> Self {
         let [olds, news] = [old, new].map(|lines| lines.iter().map(Shape::of).collect::<Vec<_>>());
         let mut open = Open { olds: (0..old.len()).collect(), news: Grid::of(&news, within_mm) };
@@ -105,20 +106,23 @@ impl<'a> Shape<'a> {
         Self { points: &line.points, bounds }
     }
 
-    /// Points spread evenly along the stroke, ends included.
+    /// Points spread evenly along the stroke, its vertices and the middles of its segments, in order.
     fn samples(&self) -> Vec<Point> {
         let length: f64 = self.points.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
         let Some((first, last)) = self.points.first().zip(self.points.last()) else { return Vec::new() };
         let mut all = vec![*first];
         let mut walked = 0.0;
+        let mut spread = 1;
         for ends in self.points.windows(2) {
+            all.extend([ends[0], ends[0].midpoint(ends[1])]);
             let step = ends[0].distance(ends[1]);
-            while all.len() < SAMPLES && step > 0.0 {
-                let next = length * all.len() as f64 / SAMPLES as f64;
+            while spread < SAMPLES && step > 0.0 {
+                let next = length * spread as f64 / SAMPLES as f64;
                 if next > walked + step {
                     break;
                 }
                 all.push(ends[0].lerp(ends[1], (next - walked) / step));
+                spread += 1;
             }
             walked += step;
         }
@@ -126,12 +130,26 @@ impl<'a> Shape<'a> {
         all
     }
 
-    /// Whether all of these points lie within a distance of the stroke.
+    /// Whether all of these points lie within a distance of the stroke. Points in the order of a line are
+    /// near segments in their order: the search for each begins where the one before was found, so that
+    /// equal strokes take linear time.
     fn holds(&self, points: &[Point], within_mm: f64) -> bool {
+        let Some(end) = self.points.len().checked_sub(1) else { return points.is_empty() };
+        // A dot is one segment without length.
+        let segments = end.max(1);
+        let mut last = 0;
         points.iter().all(|point| {
-            let near = |ends: &[Point]| to_segment(*point, ends[0], ends[1]) <= within_mm;
-            self.points.windows(2).any(near)
-                || self.points.iter().any(|vertex| vertex.distance(*point) <= within_mm)
+            let is_near = |index: &usize| {
+                to_segment(*point, self.points[*index], self.points[(index + 1).min(end)]) <= within_mm
+            };
+            let around = (0..segments).flat_map(|away| {
+                let after = Some(last + away).filter(|index| *index < segments);
+                let before = last.checked_sub(away).filter(|_| away > 0);
+                after.into_iter().chain(before)
+            });
+            let found = { around }.find(is_near);
+            last = found.unwrap_or(last);
+            found.is_some()
         })
     }
 }
@@ -393,6 +411,33 @@ mod tests {
         let new = [line(1, &[(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)])];
         let matching = Matching::of(&old, &new, 0.1);
         assert_eq!((matching.gone, matching.added), (vec![0], vec![0]));
+    }
+
+    #[test]
+    fn one_vertex_of_many_makes_another_stroke() {
+        let wave = |k: i32| Point::new(f64::from(k), f64::from(k % 7));
+        let old = Polyline { pen: 1, points: (0..500).map(wave).collect() };
+        for changed in 1..499 {
+            let mut new = old.clone();
+            new.points[changed].y += 0.1;
+            // Inside the bounding box of the whole.
+            new.points[changed].y = new.points[changed].y.min(5.9);
+            let matching = Matching::of(std::slice::from_ref(&old), &[new], 0.01);
+            assert_eq!((matching.gone.len(), matching.added.len()), (1, 1), "vertex {changed}");
+        }
+    }
+
+    #[test]
+    fn long_strokes_are_compared_in_linear_time() {
+        let spiral = |k: i32| {
+            let t = f64::from(k) * 0.01;
+            Point::new(t * libm::cos(t), t * libm::sin(t))
+        };
+        let old = Polyline { pen: 1, points: (0..200_000).map(spiral).collect() };
+        let mut new = old.clone();
+        new.points.reverse();
+        let matching = Matching::of(&[old], &[new], 0.01);
+        assert_eq!((matching.same.len(), matching.reversed()), (1, 1));
     }
 
     #[test]

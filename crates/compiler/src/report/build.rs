@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::DiffReport;
+use super::{DiffReport, ErrorReport};
 
 /// An output of `plotplan.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -17,17 +17,19 @@ pub struct BuiltOutput {
     /// With `--check`: how the file differs from what would be made; `null` where it cannot be compared
     /// stroke by stroke.
     pub changes: Option<DiffReport>,
+    /// Why it could not be made.
+    pub error: Option<ErrorReport>,
 }
 
 impl BuiltOutput {
     /// An output that is what the project makes.
     pub fn up_to_date(file: &str) -> Self {
-        Self { file: file.to_owned(), state: BuiltState::UpToDate, reason: None, changes: None }
+        Self { file: file.to_owned(), state: BuiltState::UpToDate, reason: None, changes: None, error: None }
     }
 
     /// An output that could not be made.
-    pub fn failed(file: &str) -> Self {
-        Self { state: BuiltState::Failed, ..Self::up_to_date(file) }
+    pub fn failed(file: &str, error: Option<ErrorReport>) -> Self {
+        Self { state: BuiltState::Failed, error, ..Self::up_to_date(file) }
     }
 }
 

@@ -48,12 +48,15 @@ pub struct StrokesReport {
 /// A quantity of both sides.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct QuantityReport {
-    /// What it is, with its unit: `time_s`, `ink_mm`, `travel_mm`, `rows`, `strokes`, `stray_max_mm`.
+    /// What it is, with its unit: `time_s`, `ink_mm`, `travel_mm`, `rows`, `strokes`. Of the certificates
+    /// of plan documents: `stray_max_mm` (from the ink to the drawing), `missed_max_mm` (from the drawing
+    /// to the ink), and the largest of the motors' `speed_share`, `acceleration_share` and `jerk_share`
+    /// (peak divided by limit).
     pub key: String,
-    /// Its old value; `null` where that side does not state it.
-    pub old: Option<f64>,
+    /// Its old value.
+    pub old: f64,
     /// Its new value.
-    pub new: Option<f64>,
+    pub new: f64,
 }
 
 /// A key whose value differs.
@@ -119,9 +122,7 @@ impl CauseReport {
 impl DiffReport {
     /// The report of a comparison.
     pub fn of(diff: &Diff) -> Self {
-        let rounded = |key: &str, value: Option<f64>| {
-            value.map(|value| if key.ends_with("_s") { round::s(value) } else { round::mm(value) })
-        };
+        let rounded = |key: &str, value| if key.ends_with("_s") { round::s(value) } else { round::mm(value) };
         let quantities = diff.quantities().into_iter();
         Self {
             same: diff.is_empty(),
@@ -149,7 +150,8 @@ impl DiffReport {
             let _ = writeln!(text, "strokes  {}", strokes.text());
         }
         for quantity in &self.quantities {
-            if quantity.old == quantity.new || quantity.key == "strokes" {
+            // What is the same in print is noise.
+            if quantity.shown(quantity.old) == quantity.shown(quantity.new) || quantity.key == "strokes" {
                 continue;
             }
             let _ = writeln!(text, "{}", quantity.text());
@@ -196,24 +198,28 @@ impl StrokesReport {
 }
 
 impl QuantityReport {
+    fn shown(&self, value: f64) -> String {
+        match &*self.key {
+            "time_s" => duration(value),
+            "ink_mm" | "travel_mm" => length(value),
+            key if key.ends_with("_mm") => format!("{value:.3} mm"),
+            key if key.ends_with("_share") => format!("{:.1} %", 100.0 * value),
+            _ => format!("{value:.0}"),
+        }
+    }
+
     fn text(&self) -> String {
-        let shown = |value: Option<f64>| match (value, &*self.key) {
-            (None, _) => "none".to_owned(),
-            (Some(value), "time_s") => duration(value),
-            (Some(value), "ink_mm" | "travel_mm") => length(value),
-            (Some(value), key) if key.ends_with("_mm") => format!("{value:.3} mm"),
-            (Some(value), _) => format!("{value:.0}"),
+        let name = match self.key.split('_').next() {
+            Some("acceleration") => "accel",
+            Some(name) => name,
+            None => &self.key,
         };
-        let name = match &*self.key {
-            "stray_max_mm" => "stray",
-            "missed_max_mm" => "missed",
-            key => key.split('_').next().unwrap_or(key),
-        };
-        let mut text = format!("{name:<8} {} -> {}", shown(self.old), shown(self.new));
-        if let (Some(old), Some(new)) = (self.old, self.new)
-            && old > 0.0
-        {
-            let _ = write!(text, " ({:+.1} %)", 100.0 * (new / old - 1.0));
+        let mut text = format!("{name:<8} {} -> {}", self.shown(self.old), self.shown(self.new));
+        let per_cent = 100.0 * (self.new / self.old - 1.0);
+        if self.key.ends_with("_share") {
+            text.push_str(" of the limit");
+        } else if self.old > 0.0 && per_cent.abs() >= 0.05 {
+            let _ = write!(text, " ({per_cent:+.1} %)");
         }
         text
     }

@@ -18,7 +18,7 @@ pub mod text;
 pub mod tuning;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use self::build::{BuiltOutput, BuiltState};
 pub use self::certificate::{
@@ -140,7 +140,7 @@ impl ArrangedReport {
 }
 
 /// A finding about an input, or a warning of the program.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Finding {
     /// The input file, as given; `null` for warnings that concern no place in a file.
     pub file: Option<String>,
@@ -200,7 +200,7 @@ impl Finding {
 }
 
 /// Why a command failed.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ErrorReport {
     /// The kind of failure.
     pub code: Code,
@@ -213,7 +213,7 @@ pub struct ErrorReport {
 }
 
 /// A place in an input file and on the machine.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Place {
     /// The file, as given.
     pub file: String,
@@ -288,7 +288,7 @@ pub const EXIT_CODES: [ExitCode; 5] = [
 macro_rules! codes {
     ($($variant:ident $name:literal $exit:literal $meaning:literal)*) => {
         /// The kind of a failure or warning.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "kebab-case")]
         pub enum Code {
             $(#[doc = $meaning] $variant,)*

@@ -27,6 +27,11 @@ pub(super) fn ticks(value: f64) -> f64 {
     to(value, 1e3)
 }
 
+/// A gain margin, or a phase margin in degrees: to a thousandth.
+pub(super) fn margin(value: f64) -> f64 {
+    to(value, 1e3)
+}
+
 /// A coefficient of a map: to 1e-9.
 pub(super) fn coefficient(value: f64) -> f64 {
     to(value, 1e9)

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use simulation::Identified;
 
+use super::round;
 use crate::tune::{Measure, Tuning};
 
 /// The result of a search. Lengths are mm, times s.
@@ -46,18 +47,34 @@ impl TuningReport {
         let off = tuning.off.iter().map(|case| OffReport {
             key: case.key,
             factor: case.factor,
-            stray_rms_mm: case.stray_rms_mm,
-            gain_margin: Some(case.gain_margin).filter(|gain| gain.is_finite()),
-            phase_margin_deg: case.phase_margin_deg,
+            stray_rms_mm: round::mm(case.stray_rms_mm),
+            gain_margin: Some(case.gain_margin).filter(|gain| gain.is_finite()).map(round::margin),
+            phase_margin_deg: round::margin(case.phase_margin_deg),
         });
         Self {
-            measures: tuning.measures.clone(),
-            rounding_rms_mm: tuning.rounding_rms_mm,
-            frictionless_rms_mm: tuning.frictionless_rms_mm,
-            saturated_share: tuning.saturated_share,
+            measures: tuning.measures.iter().map(rounded).collect(),
+            rounding_rms_mm: round::mm(tuning.rounding_rms_mm),
+            frictionless_rms_mm: round::mm(tuning.frictionless_rms_mm),
+            saturated_share: round::share(tuning.saturated_share),
             off: off.collect(),
             simulations: tuning.simulations,
         }
+    }
+}
+
+/// A measure with numbers rounded to what they mean.
+fn rounded(measure: &Measure) -> Measure {
+    Measure {
+        stray_max_mm: round::mm(measure.stray_max_mm),
+        stray_rms_mm: round::mm(measure.stray_rms_mm),
+        missed_rms_mm: round::mm(measure.missed_rms_mm),
+        period_s: round::s(measure.period_s),
+        kp: measure.kp.map(round::coefficient),
+        ki: measure.ki.map(round::coefficient),
+        kd: measure.kd.map(round::coefficient),
+        gain_margin: measure.gain_margin.map(round::margin),
+        phase_margin_deg: measure.phase_margin_deg.map(round::margin),
+        ..measure.clone()
     }
 }
 
@@ -235,5 +252,33 @@ impl MotorEstimates {
             "record a slow ramp from rest, then runs at two or more duties and back to rest"
         };
         Some(format!("the record does not determine {}: {help}", self.undetermined.join(", ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measures_are_rounded_to_what_they_mean() {
+        let measure = Measure {
+            name: "I and D",
+            stray_max_mm: 46.520_769_487_228_79,
+            stray_rms_mm: 10.105_960_597_167_817,
+            missed_rms_mm: 27.893_326_214_156_627,
+            period_s: 0.001_000_000_000_000_2,
+            kp: Some(0.082_075_784_178_417_95),
+            ki: None,
+            kd: Some(1.0 / 3.0),
+            gain_margin: Some(23.168_153_048_612_837),
+            phase_margin_deg: Some(48.894_550_400_870_8),
+        };
+        let json = serde_json::to_string(&rounded(&measure)).expect("numbers and names");
+        assert_eq!(
+            json,
+            "{\"name\":\"I and D\",\"stray_max_mm\":46.5208,\"stray_rms_mm\":10.106,\"missed_rms_mm\":27.8933,\
+             \"period_s\":0.001,\"kp\":0.082075784,\"ki\":null,\"kd\":0.333333333,\"gain_margin\":23.168,\
+             \"phase_margin_deg\":48.895}"
+        );
     }
 }

@@ -14,7 +14,8 @@ use std::time::{Duration, SystemTime};
 use anyhow::Context as _;
 use compiler::diff::Diff;
 use compiler::import;
-use compiler::report::{BuiltOutput, BuiltState, Code, DiffReport, ErrorReport, text};
+use compiler::report::{BuiltOutput, BuiltState, Code, DiffReport, ErrorReport, Finding, text};
+use serde::Deserialize as _;
 
 pub(crate) use self::init::run as init;
 use self::job::{Job, Output};
@@ -51,7 +52,7 @@ pub(crate) fn run(arguments: &Build) -> Result<(), Failure> {
                 seen = stamps(&files);
                 match build(arguments, &jobs, &stop) {
                     Err(Failure::Interrupted) => return Err(Failure::Interrupted),
-                    Err(failure) => failure.describe(project::NAME),
+                    Err(failure) => drop(failure.describe(project::NAME)),
                     Ok(()) => {}
                 }
                 terminal::say("waiting for changes; Ctrl-C ends\n");
@@ -149,9 +150,9 @@ fn build(arguments: &Build, jobs: &[Job], stop: &AtomicBool) -> Result<(), Failu
         let made = match job.inputs() {
             Ok(made) => made,
             Err(failure) => {
-                failure.describe(&job.output);
+                let error = failure.describe(&job.output);
                 *counts.entry(BuiltState::Failed).or_default() += 1;
-                session::report(|report| report.built.push(BuiltOutput::failed(&job.output)));
+                session::report(|report| report.built.push(BuiltOutput::failed(&job.output, error)));
                 continue;
             }
         };
@@ -166,10 +167,14 @@ fn build(arguments: &Build, jobs: &[Job], stop: &AtomicBool) -> Result<(), Failu
         session::report(|report| report.built.push(BuiltOutput::up_to_date(&task.job.output)));
     }
     let result = each(&wanted, arguments.jobs, stop, |task, made| {
-        let built = if arguments.check { compare(task, made) } else { put(task, made, &mut lock) };
+        let built = succeeded(task, made).and_then(|made| match made {
+            Ok(made) if arguments.check => Ok(compare(task, &made)),
+            Ok(made) => put(task, &made, &mut lock),
+            Err(error) => Ok(BuiltOutput::failed(&task.job.output, Some(error))),
+        });
         let built = built.unwrap_or_else(|failure| {
-            failure.describe(&task.job.output);
-            BuiltOutput::failed(&task.job.output)
+            let error = failure.describe(&task.job.output);
+            BuiltOutput::failed(&task.job.output, error)
         });
         *counts.entry(built.state).or_default() += 1;
         session::report(|report| report.built.push(built));
@@ -179,7 +184,7 @@ fn build(arguments: &Build, jobs: &[Job], stop: &AtomicBool) -> Result<(), Failu
         lock.write(lock_path)?;
     }
     result?;
-    verdict(arguments, &counts)
+    verdict(&counts)
 }
 
 /// Forgets outputs that the project no longer has; the files stay.
@@ -197,7 +202,7 @@ fn forget_old(lock: &mut Lock, arguments: &Build, jobs: &[Job]) {
 }
 
 /// The summary, and the failure if there is one.
-fn verdict(arguments: &Build, counts: &BTreeMap<BuiltState, usize>) -> Result<(), Failure> {
+fn verdict(counts: &BTreeMap<BuiltState, usize>) -> Result<(), Failure> {
     let of = |state: BuiltState| counts.get(&state).copied().unwrap_or(0);
     let (failed, differ) = (of(BuiltState::Failed), of(BuiltState::Differs));
     let words = [
@@ -215,16 +220,17 @@ fn verdict(arguments: &Build, counts: &BTreeMap<BuiltState, usize>) -> Result<()
     if failed + differ == 0 {
         return Ok(());
     }
-    let message = if arguments.check {
-        format!(
-            "{} of the outputs are not what {} makes; `plotplan build` makes them",
-            failed + differ,
-            project::NAME
-        )
-    } else {
-        format!("{failed} of the outputs could not be made")
-    };
-    terminal::error(Code::Build, &message);
+    let outputs = |count: usize| if count == 1 { "1 output".to_owned() } else { format!("{count} outputs") };
+    let mut parts = Vec::new();
+    if failed > 0 {
+        parts.push(format!("{} could not be made", outputs(failed)));
+    }
+    if differ > 0 {
+        let be = if differ == 1 { "is" } else { "are" };
+        let what = format!("{} {be} not what {} makes", outputs(differ), project::NAME);
+        parts.push(format!("{what}: `plotplan build` writes {}", if differ == 1 { "it" } else { "them" }));
+    }
+    terminal::error(Code::Build, &parts.join("; "));
     Err(Failure::Refused)
 }
 
@@ -270,25 +276,31 @@ fn each(
     if stop.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
-/// What a process made, if it succeeded; its warnings are passed on.
-fn succeeded(task: &Task<'_>, made: Result<Output, Failure>) -> Result<Output, Failure> {
+/// What a process made, or why it failed; its messages and findings are passed on.
+fn succeeded(task: &Task<'_>, made: Result<Output, Failure>) -> Result<Result<Output, ErrorReport>, Failure> {
     let made = made?;
     if !made.messages.is_empty() {
         terminal::always(&format!("{}\n", made.messages));
     }
+    let findings = Vec::<Finding>::deserialize(&made.report["diagnostics"]).unwrap_or_default();
+    findings.into_iter().for_each(session::found);
     if made.is_ok {
-        return Ok(made);
+        return Ok(Ok(made));
     }
-    let message = made.report["error"]["message"].as_str().unwrap_or("the process ended early").to_owned();
     // The process has printed it already.
     terminal::always(&format!("{}: not made\n", task.job.output));
-    session::failed(ErrorReport { code: Code::Build, message, help: None, place: None });
-    Err(Failure::Refused)
+    let error = ErrorReport::deserialize(&made.report["error"]).unwrap_or_else(|_| ErrorReport {
+        code: Code::Build,
+        message: "the process ended early".to_owned(),
+        help: None,
+        place: None,
+    });
+    session::failed(ErrorReport { code: Code::Build, ..error.clone() });
+    Ok(Err(error))
 }
 
 /// Writes an output.
-fn put(task: &Task<'_>, made: Result<Output, Failure>, lock: &mut Lock) -> Result<BuiltOutput, Failure> {
-    let made = succeeded(task, made)?;
+fn put(task: &Task<'_>, made: &Output, lock: &mut Lock) -> Result<BuiltOutput, Failure> {
     let file = &task.job.output;
     if let Some(folder) = Path::new(file).parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
@@ -299,7 +311,12 @@ fn put(task: &Task<'_>, made: Result<Output, Failure>, lock: &mut Lock) -> Resul
     let what = facts(&made.report).map_or_else(String::new, |facts| format!(": {facts}"));
     terminal::say(&format!("{file}{what} ({reason})\n"));
     lock.output.insert(file.clone(), Made { sha256: import::sha256(&made.bytes), ..task.made.clone() });
-    Ok(BuiltOutput { file: file.clone(), state: BuiltState::Built, reason: Some(reason), changes: None })
+    Ok(BuiltOutput {
+        file: file.clone(),
+        state: BuiltState::Built,
+        reason: Some(reason),
+        ..BuiltOutput::up_to_date(file)
+    })
 }
 
 /// Duration and ink of a plan, by its report.
@@ -313,17 +330,20 @@ fn facts(report: &serde_json::Value) -> Option<String> {
 }
 
 /// Compares an output with what would be made, in words.
-fn compare(task: &Task<'_>, made: Result<Output, Failure>) -> Result<BuiltOutput, Failure> {
+fn compare(task: &Task<'_>, made: &Output) -> BuiltOutput {
     let file = &task.job.output;
-    let made = succeeded(task, made)?;
-    let built =
-        |state, reason: Option<String>, changes| BuiltOutput { file: file.clone(), state, reason, changes };
+    let differs = |reason: Option<String>, changes| BuiltOutput {
+        state: BuiltState::Differs,
+        reason,
+        changes,
+        ..BuiltOutput::up_to_date(file)
+    };
     let Ok(found) = std::fs::read(file) else {
         terminal::always(&format!("{file}: is not there\n"));
-        return Ok(built(BuiltState::Differs, Some("is not there".to_owned()), None));
+        return differs(Some("is not there".to_owned()), None);
     };
     if found == made.bytes {
-        return Ok(built(BuiltState::UpToDate, None, None));
+        return BuiltOutput::up_to_date(file);
     }
     let input = |bytes: Vec<u8>| Input { name: file.clone(), path: file.clone(), bytes };
     let machine = task.job.machine();
@@ -333,7 +353,7 @@ fn compare(task: &Task<'_>, made: Result<Output, Failure>) -> Result<BuiltOutput
     let words = changes.as_ref().map_or_else(|| first_difference(&found, &made.bytes), DiffReport::line);
     let why = task.reason.as_ref().map_or_else(String::new, |reason| format!(" ({reason})"));
     terminal::always(&format!("{file}: {words}{why}\n"));
-    Ok(built(BuiltState::Differs, task.reason.clone(), changes))
+    differs(task.reason.clone(), changes)
 }
 
 /// Where two files begin to differ.

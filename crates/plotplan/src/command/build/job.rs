@@ -15,7 +15,7 @@ use super::lock::Made;
 use super::project::{Entry, ProjectError};
 use crate::cli::{self, Command as Cli, Convert, Format, PageChoice};
 use crate::failure::Failure;
-use crate::{machines, options};
+use crate::{machines, options, session};
 
 /// How often a process is asked whether it has ended.
 const POLL: Duration = Duration::from_millis(5);
@@ -207,6 +207,7 @@ impl Job {
         if !self.options.iter().any(|option| option.starts_with("--format=")) {
             command.arg("--format").arg(self.format.name());
         }
+        command.args(session::style().as_arguments());
         command.args(["--report=json", "--color=never", "--output=-", "--"]).args(&self.drawings);
         command.stdin(Stdio::null()).stdout(copy(out)?).stderr(copy(messages)?);
         let mut child = command.spawn().map_err(failed("cannot start a process"))?;
