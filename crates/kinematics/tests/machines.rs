@@ -262,3 +262,29 @@ fn quantization_error_of_the_coaxial_arm() {
     let tick = m.joint_rates(&MotorPos::new(1.0, 0.0));
     assert!((m.mechanism().pen_velocity(&m.start(), &tick).hypot() - 0.4045).abs() < 1e-4);
 }
+
+#[test]
+fn pole_that_the_radius_does_not_reach_is_refused_with_its_joint() {
+    let mut parts = machine(Polar::default()).parts().clone();
+    let towards = Point::new(0.0, 150.0);
+    let whole = machines::build(parts.clone());
+    let poses = whole.poses_at_pole(towards, &whole.start()).expect("no limits");
+    assert!(!poses.is_empty() && poses.iter().all(|pose| pose[1] == 0.0), "{poses:?}");
+    parts.joints[1] = JointRange { min: 5.0, max: 400.0 };
+    let limited = machines::build(parts);
+    let fault = limited.poses_at_pole(towards, &limited.start()).expect_err("the radius is 0 at the pole");
+    assert!(matches!(fault, Fault::JointLimit { joint: "r", .. }), "{fault:?}");
+}
+
+#[test]
+fn line_through_the_pole_of_a_polar_machine_is_allowed_and_found() {
+    let m = machine(Polar::default());
+    let through = Line::new((-80.0, -60.0), (40.0, 30.0));
+    assert_eq!(m.pole_on(&through), Some(Point::ZERO));
+    assert_eq!(m.check_segment(&Segment::Line(through)), Ok(()));
+    let beside = Line::new((-80.0, -59.9), (40.0, 30.1));
+    assert_eq!(m.pole_on(&beside), None);
+    // An offset rack never brings the pen to the axis.
+    let m = machine(Polar { rack_offset_mm: 3.0 });
+    assert_eq!(m.pole_on(&through), None);
+}
