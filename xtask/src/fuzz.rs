@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use crate::programs::{execute, text_of};
+use crate::programs::{cpu_seconds_in, execute, text_of, timed};
 
 /// One file of `fuzz/fuzz_targets` each.
 pub(crate) const TARGETS: &[&str] = &["read", "emit", "svg", "recognize", "plans", "machines", "answers"];
@@ -69,11 +69,7 @@ impl Fuzzers {
         command.arg(format!("-max_total_time={seconds}"));
         command.args(dictionary.map(|file| format!("-dict=fuzz/{file}")));
         command.args(seed.map(|seed| format!("-seed={}", seed as u32)));
-        // The processor time of the run, by the shell that waits for it.
-        let mut timed = Command::new("bash");
-        timed.args(["-c", "TIMEFORMAT='cpu: %U %S'; time \"$@\"", "bash"]);
-        timed.arg(command.get_program()).args(command.get_args());
-        let output = timed.current_dir(crate::top()).output().with_context(|| target.to_owned())?;
+        let output = timed(&command).current_dir(crate::top()).output().with_context(|| target.to_owned())?;
         let said = String::from_utf8_lossy(&output.stderr);
         if !output.status.success() {
             let end: Vec<&str> = said.lines().rev().take(60).collect();
@@ -82,9 +78,7 @@ impl Fuzzers {
         }
         let number = |label: &str| said.lines().rev().find_map(|line| line.strip_prefix(label));
         let executions = number("stat::number_of_executed_units:").context("no number of executions")?;
-        let cpu: Option<f64> =
-            number("cpu: ").map(|times| times.split(' ').filter_map(|time| time.parse::<f64>().ok()).sum());
-        Ok(Run { executions: executions.trim().parse()?, cpu_s: cpu.context("no processor time")? })
+        Ok(Run { executions: executions.trim().parse()?, cpu_s: cpu_seconds_in(&said).context("no processor time")? })
     }
 
     /// Runs all targets, one on each core.

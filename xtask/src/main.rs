@@ -66,6 +66,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bench rounding [DIR]
                 ink of whole ticks along the path and of the nearest ticks, on the examples and the
                 drawings in DIR: distances from the exact path, CPU time
+  bench throughput [PROGRAM]
+                CPU time of drawings of more than a megabyte by step, beside that of commit 5e26b6c or
+                of PROGRAM
   bench place   what the search for the best place gains on the examples
   bench simulate
       speed of simulations and of a search of gains
@@ -108,6 +111,8 @@ fn main() -> ExitCode {
         ["bench", "read-once", file] => bench::read_once(file.as_ref()),
         ["bench", "rounding"] => bench::rounding(None),
         ["bench", "rounding", folder] => bench::rounding(Some(folder.as_ref())),
+        ["bench", "throughput"] => bench::throughput(None),
+        ["bench", "throughput", program] => bench::throughput(Some(program.as_ref())),
         ["bench", "place"] => bench::place(),
         ["bench", "simulate"] => bench::simulate(),
         ["bench", "plan"] => bench::plan("python3"),

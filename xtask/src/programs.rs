@@ -38,6 +38,28 @@ fn shown(command: &Command) -> String {
     words.map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
 }
 
+/// Runs a command that must succeed; its processor time, s.
+pub(crate) fn cpu_seconds(command: &mut Command) -> Result<f64> {
+    let output = timed(command).output().context("bash")?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{}: {}\n{said}", shown(command), output.status);
+    cpu_seconds_in(&said).context("no processor time")
+}
+
+/// A shell that runs the command and prints its processor time to standard error.
+pub(crate) fn timed(command: &Command) -> Command {
+    let mut timed = Command::new("bash");
+    timed.args(["-c", "TIMEFORMAT='cpu: %U %S'; time \"$@\"", "bash"]);
+    timed.arg(command.get_program()).args(command.get_args());
+    timed
+}
+
+/// The processor time that the shell of [`timed`] printed, s.
+pub(crate) fn cpu_seconds_in(said: &str) -> Option<f64> {
+    let times = said.lines().rev().find_map(|line| line.strip_prefix("cpu: "))?;
+    Some(times.split(' ').filter_map(|time| time.parse::<f64>().ok()).sum())
+}
+
 /// Writes a file and the folders that it lies in.
 pub(crate) fn write(path: &Path, contents: impl AsRef<[u8]>) -> Result<()> {
     if let Some(folder) = path.parent() {

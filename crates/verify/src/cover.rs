@@ -86,14 +86,14 @@ impl Cover {
         }
         let count = piece.cells as usize;
         let cell = piece.length / f64::from(piece.cells);
+        // The cells within the radius along the piece.
         let (first, last) = if piece.length > 0.0 {
-            let first = ((low - radius) / cell) as usize;
-            (first / BLOCK, (((high + radius) / cell) as usize).saturating_add(1).min(count).div_ceil(BLOCK))
+            (((low - radius) / cell) as usize, (((high + radius) / cell) as usize).saturating_add(1).min(count))
         } else {
             (0, 1)
         };
         let (error, limit) = (run.error as f32, radius as f32);
-        for block in first..last {
+        for block in first / BLOCK..last.div_ceil(BLOCK) {
             let from = block * BLOCK;
             let to = (from + BLOCK).min(count);
             let (start, end) = (from as f64 * cell, to as f64 * cell);
@@ -103,23 +103,21 @@ impl Cover {
             if f64::from(*worst) * f64::from(*worst) <= aside * aside + beyond * beyond {
                 continue;
             }
-            let at = piece.first_cell as usize;
-            let cells = &mut self.cells[at + from..at + to];
-            let start = if self.sparse { start + 0.5 * cell } else { start };
+            let cells = &mut self.cells[piece.first_cell as usize..][from..to];
+            let near = &mut cells[first.saturating_sub(from)..last.min(to) - from];
+            let start = from.max(first) as f64 * cell + if self.sparse { 0.5 * cell } else { 0.0 };
             let mut squares = [0.0; BLOCK + 1];
-            for (index, square) in (0..).zip(&mut squares[..=cells.len()]) {
+            for (index, square) in (0..).zip(&mut squares[..=near.len()]) {
                 *square = run.square_at(start + f64::from(index) * cell);
             }
             // Plain comparisons, which the compiler vectorizes.
             let ends = if self.sparse { &squares[..] } else { &squares[1..] };
-            let mut largest = 0.0_f32;
-            for ((covered, at_start), at_end) in cells.iter_mut().zip(&squares).zip(ends) {
+            for ((covered, at_start), at_end) in near.iter_mut().zip(&squares).zip(ends) {
                 let square = if at_end > at_start { *at_end } else { *at_start };
                 let kept = bound(square as f32, error, limit);
                 *covered = if kept < *covered { kept } else { *covered };
-                largest = if *covered > largest { *covered } else { largest };
             }
-            *worst = largest;
+            *worst = cells.iter().fold(0.0, |largest, covered| if *covered > largest { *covered } else { largest });
         }
     }
 

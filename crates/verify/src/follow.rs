@@ -1,13 +1,13 @@
 //! Following: a fast path for drawings with hundreds of strokes near each run.
 //!
 //! Where strokes are that close, examining all of them for every run takes too long. Then only
-//! those pieces are examined that the run may draw ([`Piece::is_alongside`]), and then those stretches of
+//! those pieces are examined that the run may draw ([`Line::is_alongside`]), and then those stretches of
 //! strokes that have stayed near since the pen came here. Every distance found this way is still an
 //! upper bound. Strokes that begin or end where a followed stroke does join in, because ordering may
 //! have joined them. What may be lost is that ink covers a stroke in passing; so a table that fails while
 //! following is measured again in full, see [`crate::certify`].
 //!
-//! [`Piece::is_alongside`]: crate::target::Piece::is_alongside
+//! [`Line::is_alongside`]: crate::target::Line::is_alongside
 
 use std::collections::VecDeque;
 use std::ops::Range;

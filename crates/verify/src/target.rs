@@ -92,27 +92,6 @@ impl Piece {
             && x0.max(x1) >= -radius
     }
 
-    /// Whether the run may draw this piece: no end of either that is beside the other is farther than
-    /// `radius` from its line. A stroke that the run only crosses leaves the radius.
-    pub(crate) fn is_alongside(&self, run: &Run, radius: f64) -> bool {
-        let radius = radius + self.error;
-        let is_far =
-            |along: f64, across: f64, length: f64| (0.0..=length).contains(&along) && across.abs() > radius;
-        if [run.from, run.to].into_iter().any(|end| {
-            let (along, across) = self.local(end);
-            is_far(along, across, self.length)
-        }) {
-            return false;
-        }
-        let vector = run.to - run.from;
-        let length = vector.hypot2().sqrt();
-        let unit = if length > 0.0 { vector / length } else { Vec2::new(1.0, 0.0) };
-        self.ends().into_iter().all(|end| {
-            let v = end - run.from;
-            !is_far(v.dot(unit), unit.cross(v), length)
-        })
-    }
-
     fn ends(&self) -> [Point; 2] {
         [self.start, self.at(self.length)]
     }
@@ -120,6 +99,48 @@ impl Piece {
     pub(crate) fn bounds(&self) -> Rect {
         let [start, end] = self.ends();
         Rect::from_points(start, end)
+    }
+}
+
+/// A straight line by its ends, to the precision of a search.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line([f32; 4]);
+
+impl Line {
+    fn new([from, to]: [Point; 2]) -> Self {
+        Self([from.x, from.y, to.x, to.y].map(|c| c as f32))
+    }
+
+    fn ends(&self) -> [Point; 2] {
+        let [x0, y0, x1, y1] = self.0.map(f64::from);
+        [Point::new(x0, y0), Point::new(x1, y1)]
+    }
+
+    /// Whether line and box have a point in common: they have none if they are apart along an axis of the
+    /// box or across the line (separating axes of convex sets).
+    pub(crate) fn meets(&self, bounds: Rect) -> bool {
+        let [x0, y0, x1, y1] = self.0.map(f64::from);
+        let apart = x0.min(x1) > bounds.x1
+            || x0.max(x1) < bounds.x0
+            || y0.min(y1) > bounds.y1
+            || y0.max(y1) < bounds.y0;
+        let (x, y) = (x1 - x0, y1 - y0);
+        let middle = bounds.center();
+        let across = (x * (middle.y - y0) - y * (middle.x - x0)).abs();
+        let half = 0.5 * (y.abs() * bounds.width() + x.abs() * bounds.height());
+        !(apart || across > half)
+    }
+
+    /// Whether the run may draw this line: no end of either that is beside the other is farther than
+    /// `radius` from it. A stroke that the run only crosses leaves the radius.
+    pub(crate) fn is_alongside(&self, run: &Run, radius: f64) -> bool {
+        let (line, run) = (self.ends(), [run.from, run.to]);
+        let is_far = |[from, to]: [Point; 2], end: Point| {
+            let (vector, v) = (to - from, end - from);
+            let (square, along, across) = (vector.hypot2(), v.dot(vector), vector.cross(v));
+            (0.0..=square).contains(&along) && across * across > radius * radius * square
+        };
+        !(run.iter().any(|end| is_far(line, *end)) || line.iter().any(|end| is_far(run, *end)))
     }
 }
 
@@ -152,7 +173,7 @@ struct BoxTree {
     /// The lines by location, see [`by_position`].
     order: Vec<u32>,
     /// The lines in that order: a search reads them in sequence, not from all over the memory.
-    lines: Vec<[f32; 4]>,
+    lines: Vec<Line>,
     /// Largest difference of a coordinate from its `f32`, mm.
     rounding: f64,
     /// `levels[0][i]` bounds the items `order[FAN * i..FAN * (i + 1)]`, `levels[k + 1][i]` the
@@ -176,17 +197,17 @@ impl BoxTree {
         let all = level[0];
         levels.push(level);
         let largest = [all.x0, all.y0, all.x1, all.y1].into_iter().fold(0.0_f64, |sum, c| sum.max(c.abs()));
-        let compact = |[from, to]: [Point; 2]| [from.x, from.y, to.x, to.y].map(|c| c as f32);
         Self {
-            lines: order.iter().map(|i| compact(lines[*i as usize])).collect(),
+            lines: order.iter().map(|i| Line::new(lines[*i as usize])).collect(),
             rounding: largest * f64::from(f32::EPSILON),
             order,
             levels,
         }
     }
 
-    /// Calls `to` with every line that meets `bounds`, and perhaps with others that nearly do.
-    fn visit(&self, bounds: Rect, mut to: impl FnMut(u32)) {
+    /// Calls `to` with every line that meets `bounds`, and perhaps with others that nearly do, and its
+    /// number.
+    fn visit(&self, bounds: Rect, mut to: impl FnMut(Line, u32)) {
         let wider = bounds.inflate(self.rounding, self.rounding);
         let mut open = vec![(self.levels.len() - 1, 0)];
         while let Some((level, index)) = open.pop() {
@@ -201,25 +222,13 @@ impl BoxTree {
             } else {
                 let items = children.start..children.end.min(self.order.len());
                 for (line, index) in self.lines[items.clone()].iter().zip(&self.order[items]) {
-                    if line_meets(line.map(f64::from), wider) {
-                        to(*index);
+                    if line.meets(wider) {
+                        to(*line, *index);
                     }
                 }
             }
         }
     }
-}
-
-/// Whether a line, given by its ends, and a box have a point in common: they have none if they are apart
-/// along an axis of the box or across the line (separating axes of convex sets).
-fn line_meets([x0, y0, x1, y1]: [f64; 4], bounds: Rect) -> bool {
-    let apart =
-        x0.min(x1) > bounds.x1 || x0.max(x1) < bounds.x0 || y0.min(y1) > bounds.y1 || y0.max(y1) < bounds.y0;
-    let (x, y) = (x1 - x0, y1 - y0);
-    let middle = bounds.center();
-    let across = (x * (middle.y - y0) - y * (middle.x - x0)).abs();
-    let half = 0.5 * (y.abs() * bounds.width() + x.abs() * bounds.height());
-    !(apart || across > half)
 }
 
 impl PenTarget {
@@ -239,15 +248,20 @@ impl PenTarget {
         Self { pen, pieces, all, ends, ends_tree }
     }
 
-    /// Calls `to` with the index of every piece that meets `bounds`, and perhaps with others that nearly
-    /// do.
-    pub(crate) fn visit(&self, bounds: Rect, to: impl FnMut(u32)) {
+    /// Calls `to` with every piece that meets `bounds`, and perhaps with others that nearly do: its line
+    /// and its index.
+    pub(crate) fn visit(&self, bounds: Rect, to: impl FnMut(Line, u32)) {
         self.all.visit(bounds, to);
+    }
+
+    /// Largest difference of a coordinate of a [`Line`] from that of its piece, mm.
+    pub(crate) fn line_error(&self) -> f64 {
+        self.all.rounding
     }
 
     /// Calls `to` with the first or last piece of every stroke that begins or ends in `bounds`.
     pub(crate) fn visit_ends(&self, bounds: Rect, mut to: impl FnMut(u32)) {
-        self.ends_tree.visit(bounds, |end| {
+        self.ends_tree.visit(bounds, |_, end| {
             let (point, piece) = self.ends[end as usize];
             if bounds.contains(point) {
                 to(piece);
@@ -438,7 +452,7 @@ mod tests {
                 .collect();
             let bounds = Rect::new(x + offset, y, x + width + offset, y + height);
             let mut found = Vec::new();
-            BoxTree::new(&lines).visit(bounds, |index| found.push(index as usize));
+            BoxTree::new(&lines).visit(bounds, |_, index| found.push(index as usize));
             found.sort_unstable();
             let slack = 4.0 * (offset + 12.0) * f64::from(f32::EPSILON);
             for (index, [from, to]) in lines.iter().enumerate() {
@@ -456,7 +470,7 @@ mod tests {
     fn crossing_piece_is_not_alongside_and_drawn_one_is() {
         let at = At { row: 0, t_us: 0 };
         let run = Run { from: Point::ZERO, to: Point::new(4.0, 0.1), error: 0.0, at };
-        let piece = |from, to| Piece::new(Point::from(from), Point::from(to), 0.0, 0);
+        let piece = |from, to| Line::new([Point::from(from), Point::from(to)]);
         for drawn in
             [piece((-1.0, 0.2), (9.0, 0.0)), piece((1.0, -0.2), (1.5, 0.3)), piece((3.9, 0.3), (3.9, 9.0))]
         {

@@ -15,7 +15,7 @@ use crate::{
     histogram::Histogram,
     near::{HALVINGS, Near, better},
     run::{At, Chain, Run},
-    target::{PenTarget, Target, meet},
+    target::{Line, PenTarget, Target, meet},
 };
 
 /// Merging distance of chords, as a share of the tolerance.
@@ -56,7 +56,7 @@ pub(crate) struct Trace {
     pen: usize,
     chain: Option<Chain>,
     /// Pieces of this pen that meet `near_bounds`.
-    near: Vec<u32>,
+    near: Vec<(Line, u32)>,
     near_bounds: Option<Rect>,
     /// `near_bounds` extends the radius by this, mm.
     margin: f64,
@@ -198,14 +198,18 @@ impl Trace {
     fn examine(&mut self, target: &Target, run: &Run, bounds: Rect) -> Scope {
         let strokes = &target.pens[self.pen];
         self.gather(target, bounds);
-        self.select(strokes, run, bounds);
-        if !self.follows || self.candidates.len() <= CROWD {
-            return Scope::All;
-        }
-        let radius = self.radius;
-        self.candidates.retain(|(_, index)| strokes.pieces[*index as usize].is_alongside(run, radius));
-        if !self.candidates.is_empty() {
-            return Scope::Alongside;
+        if self.follows {
+            // By the lines, which lie side by side in memory: which pieces are left out does not matter here.
+            let near = self.near.iter().filter(|(line, _)| line.meets(bounds));
+            if near.clone().count() > CROWD {
+                let radius = self.radius + strokes.line_error();
+                self.candidates.clear();
+                let alongside = near.filter(|(line, _)| line.is_alongside(run, radius));
+                self.candidates.extend(alongside.map(|(_, index)| (0.0, *index)));
+                if !self.candidates.is_empty() {
+                    return Scope::Alongside;
+                }
+            }
         }
         self.select(strokes, run, bounds);
         Scope::All
@@ -301,11 +305,14 @@ impl Trace {
     fn select(&mut self, strokes: &PenTarget, run: &Run, bounds: Rect) {
         self.candidates.clear();
         let radius = self.radius;
-        let may_be_near = |index: &&u32| {
-            let piece = &strokes.pieces[**index as usize];
-            meet(piece.bounds(), bounds) && piece.may_be_near(run.from, run.to, radius)
+        let wider = bounds.inflate(strokes.line_error(), strokes.line_error());
+        let may_be_near = |(line, index): &&(Line, u32)| {
+            line.meets(wider) && {
+                let piece = &strokes.pieces[*index as usize];
+                meet(piece.bounds(), bounds) && piece.may_be_near(run.from, run.to, radius)
+            }
         };
-        self.candidates.extend(self.near.iter().filter(may_be_near).map(|index| (0.0, *index)));
+        self.candidates.extend(self.near.iter().filter(may_be_near).map(|(_, index)| (0.0, *index)));
     }
 
     /// Ensures that `near` holds every piece that meets `bounds`. A wider list is kept while the
@@ -325,7 +332,7 @@ impl Trace {
         }
         let wider = bounds.inflate(self.margin, self.margin);
         self.near.clear();
-        target.pens[self.pen].visit(wider, |index| self.near.push(index));
+        target.pens[self.pen].visit(wider, |line, index| self.near.push((line, index)));
         self.near_bounds = Some(wider);
     }
 

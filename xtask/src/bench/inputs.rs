@@ -6,6 +6,8 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::Random;
+
 const SIZES: [(&str, usize); 2] = [("1m", 1_000_000), ("10m", 10_000_000)];
 const WIDTH: f64 = 10_365.0;
 const HEIGHT: f64 = 7962.0;
@@ -35,19 +37,6 @@ pub(super) fn write(folder: &Path) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Pseudo-random numbers (xorshift, Marsaglia 2003), the same in every run.
-struct Random(u64);
-
-impl Random {
-    /// A number from 0 to `below`.
-    fn up_to(&mut self, below: f64) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        below * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
 }
 
 fn push(bytes: &mut Vec<u8>, text: &str) {

@@ -6,6 +6,7 @@ mod plan;
 mod read;
 mod rounding;
 mod simulate;
+mod throughput;
 mod workload;
 
 use std::collections::BTreeMap;
@@ -42,6 +43,16 @@ pub(crate) fn place() -> Result<bool> {
         return released(&["place".as_ref()]);
     }
     place::run()
+}
+
+/// `bench throughput`, beside another program; true if all goals were met.
+pub(crate) fn throughput(other: Option<&Path>) -> Result<bool> {
+    if cfg!(debug_assertions) {
+        let other = other.map(std::path::absolute).transpose()?;
+        let arguments = other.iter().map(AsRef::as_ref);
+        return released(&std::iter::once("throughput".as_ref()).chain(arguments).collect::<Vec<&OsStr>>());
+    }
+    throughput::run(other)
 }
 
 /// `bench rounding`; true if all goals were met.
@@ -130,5 +141,18 @@ impl Clock {
     fn cpu() -> Option<f64> {
         let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
         Some(text.split(' ').next()?.parse::<f64>().ok()? * 1e-9)
+    }
+}
+
+/// Pseudo-random numbers (xorshift, Marsaglia 2003), the same in every run.
+struct Random(u64);
+
+impl Random {
+    /// A number from 0 to `below`.
+    fn up_to(&mut self, below: f64) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        below * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
