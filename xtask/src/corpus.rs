@@ -1,5 +1,5 @@
-//! Runs the release binary over every drawing below a folder: `check`, and `convert --fit` on two
-//! machines.
+//! Runs the program over every drawing below a folder: `check`, and `convert --fit` on two machines, or with
+//! limits of jerk on three.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,6 +8,9 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
+use compiler::machine_file::PRESETS;
+
+use crate::programs::{build, cpu_time};
 
 /// Limit of one run's CPU time, which the load of the machine does not change.
 const LIMIT: Duration = Duration::from_secs(10);
@@ -19,6 +22,54 @@ const LIMIT_A_KILOMETRE: Duration = Duration::from_secs(30);
 /// A run may wait this many times longer than it may compute.
 const WAIT: u32 = 4;
 const MACHINES: [&str; 2] = ["coaxial", "polar"];
+const JERK_MACHINES: [&str; 3] = ["coaxial", "polar", "corexy"];
+/// Time in which the machines of `--jerk` build up their acceleration, s.
+const BUILD_UP_S: f64 = 0.05;
+/// With limits of jerk a plan takes this many times longer at most.
+const JERK_LIMIT: u32 = 4;
+
+/// What every drawing is run with.
+struct Runs {
+    binary: PathBuf,
+    /// Names for the table, and what `--machine` gets.
+    machines: Vec<(&'static str, PathBuf)>,
+    /// On a plan: a whole number of times of [`LIMIT`] and [`LIMIT_A_KILOMETRE`].
+    limit: u32,
+}
+
+impl Runs {
+    fn new(jerk: bool, work: &Path) -> Result<Self> {
+        let binary = build("quick")?;
+        if !jerk {
+            let machines = MACHINES.map(|name| (name, PathBuf::from(name))).into();
+            return Ok(Self { binary, machines, limit: 1 });
+        }
+        let mut machines = Vec::new();
+        for name in JERK_MACHINES {
+            let preset = PRESETS.iter().find(|preset| preset.name == name).context("a preset")?;
+            let file = work.join(format!("{name}.toml"));
+            std::fs::write(&file, with_jerk(preset.toml)?)?;
+            machines.push((name, file));
+        }
+        Ok(Self { binary, machines, limit: JERK_LIMIT })
+    }
+}
+
+/// A machine file with a limit of jerk for every motor.
+fn with_jerk(machine: &str) -> Result<String> {
+    let mut text = String::new();
+    let mut motors = 0;
+    for line in machine.lines() {
+        writeln!(text, "{line}")?;
+        let Some(value) = line.strip_prefix("max_acceleration = \"") else { continue };
+        let end = value.find(|c: char| !(c.is_ascii_digit() || c == '.')).context("a unit")?;
+        let unit = value[end..].split("/s2").next().context("an acceleration")?;
+        writeln!(text, "max_jerk = \"{}{unit}/s3\"", value[..end].parse::<f64>()? / BUILD_UP_S)?;
+        motors += 1;
+    }
+    anyhow::ensure!(motors == 2, "{motors} accelerations in\n{machine}");
+    Ok(text)
+}
 const ENDINGS: [&str; 5] = ["hpgl", "plt", "hpg", "hp", "pcl"];
 
 /// The result of one run of the binary.
@@ -35,22 +86,22 @@ struct Run {
 }
 
 /// Prints a table and a summary; true if no run failed.
-pub(crate) fn run(folder: &Path) -> Result<bool> {
+pub(crate) fn run(folder: &Path, jerk: bool) -> Result<bool> {
     let mut drawings = Vec::new();
     find(folder, &mut drawings)?;
     drawings.sort();
     anyhow::ensure!(!drawings.is_empty(), "no drawings below {}", folder.display());
-    let binary = build()?;
     let work = tempfile::tempdir()?;
+    let runs = Runs::new(jerk, work.path())?;
     let queue = Mutex::new(drawings.iter().enumerate());
     let results = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for worker in 0..2 {
-            let (binary, queue, results) = (&binary, &queue, &results);
+            let (runs, queue, results) = (&runs, &queue, &results);
             let output = work.path().join(format!("{worker}.csv"));
             scope.spawn(move || {
                 while let Some((index, drawing)) = next(queue) {
-                    let row = one(binary, folder, drawing, &output);
+                    let row = one(runs, folder, drawing, &output);
                     if let Ok(mut results) = results.lock() {
                         results.push((index, row));
                     }
@@ -60,7 +111,8 @@ pub(crate) fn run(folder: &Path) -> Result<bool> {
     });
     let mut rows = results.into_inner().unwrap_or_default();
     rows.sort_by_key(|(index, _)| *index);
-    println!("{:<72} {:>8}  check  result on {}", "file", "bytes", MACHINES.join(" / "));
+    let machines: Vec<&str> = runs.machines.iter().map(|(name, _)| *name).collect();
+    println!("{:<72} {:>8}  check  result on {}", "file", "bytes", machines.join(" / "));
     let mut failed = 0;
     for (_, row) in rows {
         let (text, holds) = row?;
@@ -90,36 +142,19 @@ pub(crate) fn find(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-pub(crate) fn build() -> Result<PathBuf> {
-    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
-    let built = Command::new(cargo)
-        .args(["build", "--release", "--quiet", "--package", "plotplan", "--message-format", "json"])
-        .current_dir(crate::top())
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cannot run cargo")?;
-    anyhow::ensure!(built.status.success(), "the release build failed");
-    // Cargo's messages name the binary, for any target folder.
-    let executable = String::from_utf8_lossy(&built.stdout)
-        .lines()
-        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|message| message["target"]["name"] == "plotplan")
-        .find_map(|message| message["executable"].as_str().map(PathBuf::from));
-    executable.context("cargo did not report the path of the binary")
-}
-
 /// One row of the table, and whether all runs passed.
-fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(String, bool)> {
+fn one(runs: &Runs, folder: &Path, drawing: &Path, output: &Path) -> Result<(String, bool)> {
+    let binary = &runs.binary;
     let check = start(binary, &["check".as_ref(), drawing.as_os_str()], output, LIMIT)?;
-    let limit = LIMIT + LIMIT_A_KILOMETRE.mul_f64(kilometres(&check.stdout));
+    let limit = runs.limit * (LIMIT + LIMIT_A_KILOMETRE.mul_f64(kilometres(&check.stdout)));
     let mut faults: Vec<String> = judge_check(&check).into_iter().collect();
     let mut results = Vec::new();
-    for machine in MACHINES {
+    for (name, machine) in &runs.machines {
         let arguments: [&std::ffi::OsStr; 11] = [
             "convert".as_ref(),
             drawing.as_os_str(),
             "--machine".as_ref(),
-            machine.as_ref(),
+            machine.as_os_str(),
             "--fit".as_ref(),
             "--format".as_ref(),
             "csv".as_ref(),
@@ -132,7 +167,7 @@ fn one(binary: &Path, folder: &Path, drawing: &Path, output: &Path) -> Result<(S
         match judge_convert(&run) {
             Ok(result) => results.push(format!("{result} ({:.1} s)", run.seconds)),
             Err(fault) => {
-                faults.push(format!("on {machine}: {fault}"));
+                faults.push(format!("on {name}: {fault}"));
                 results.push("FAILED".into());
             }
         }
@@ -187,16 +222,6 @@ fn start(binary: &Path, arguments: &[&std::ffi::OsStr], output: &Path, limit: Du
         wrote: output.exists(),
         seconds: used.as_secs_f64(),
     })
-}
-
-/// CPU time that a process has used, by Linux's `/proc/PID/stat`: fields 14 and 15, user and system
-/// time in hundredths of a second (`proc_pid_stat(5)`; `USER_HZ` is 100 on all its architectures).
-fn cpu_time(process: u32) -> Option<Duration> {
-    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name of the program, field 2, is in parentheses and may contain blanks.
-    let fields: Vec<&str> = stat.rsplit_once(") ")?.1.split(' ').collect();
-    let hundredths: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
-    Some(Duration::from_millis(10 * hundredths))
 }
 
 /// A fault that no run may have, whatever its arguments.

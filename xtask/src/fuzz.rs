@@ -78,7 +78,10 @@ impl Fuzzers {
         }
         let number = |label: &str| said.lines().rev().find_map(|line| line.strip_prefix(label));
         let executions = number("stat::number_of_executed_units:").context("no number of executions")?;
-        Ok(Run { executions: executions.trim().parse()?, cpu_s: cpu_seconds_in(&said).context("no processor time")? })
+        Ok(Run {
+            executions: executions.trim().parse()?,
+            cpu_s: cpu_seconds_in(&said).context("no processor time")?,
+        })
     }
 
     /// Runs all targets, one on each core.

@@ -26,8 +26,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
 
   ci [STEP …]   run every check that a change must pass, or only the steps named
   tidy          check the dependency rules between crates, and tracked files
-  corpus DIR    run the release binary on every drawing below DIR: no panic, no timeout, no plan
-                without a certificate
+  corpus DIR [--jerk]
+                run the program on every drawing below DIR: no panic, no timeout, no plan without a
+                certificate; --jerk: on three machines with limits of jerk
   firmware [NAME …]
                 build the firmware, test it on the host and on an emulated ATmega328P; NAME selects
                 checks by a part of their name
@@ -39,7 +40,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   order DIR     plan every drawing below DIR in file order and in optimized order, on two machines
   web           build the studio's static files into target/studio
   web-test [PROGRAM] [--write]
-                test animated previews, written by PROGRAM or the release build, and the studio in a
+                test animated previews, written by PROGRAM or a build of it, and the studio in a
                 browser; installs Node.js, Chromium and npm packages if missing; --write makes new
                 reference screenshots
   bound [PYTHON] [--all]
@@ -91,7 +92,8 @@ fn main() -> ExitCode {
         ["trust", ref words @ ..] => trust::run(words),
         ["nightly", ref words @ ..] => trust::nightly(words),
         ["web"] => web::run(),
-        ["corpus", folder] => corpus::run(folder.as_ref()),
+        ["corpus", folder] => corpus::run(folder.as_ref(), false),
+        ["corpus", folder, "--jerk"] => corpus::run(folder.as_ref(), true),
         ["bound"] => bound::run("python3", false),
         ["bound", "--all"] => bound::run("python3", true),
         ["bound", python] => bound::run(python, false),

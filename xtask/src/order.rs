@@ -36,7 +36,7 @@ pub(crate) fn bench(generator: &Path) -> Result<bool> {
         "the generator failed:\n{}",
         String::from_utf8_lossy(&made.stderr)
     );
-    let binary = crate::corpus::build()?;
+    let binary = crate::programs::build("release")?;
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let mut met = true;
     for (name, target, vpype, lkh) in REFERENCES {
@@ -98,7 +98,7 @@ fn travel_of(output: &str) -> Option<f64> {
 /// Plans every drawing below a folder in file order and in optimized order, on two machines, and
 /// prints a table of durations; true if no plan takes more than 0.5 s longer.
 pub(crate) fn real(folder: &Path) -> Result<bool> {
-    let binary = crate::corpus::build()?;
+    let binary = crate::programs::build("release")?;
     let mut drawings: Vec<PathBuf> = Vec::new();
     crate::corpus::find(folder, &mut drawings)?;
     drawings.sort();

@@ -1,7 +1,8 @@
 //! Programs that tasks call.
 
-use std::path::Path;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use anyhow::{Context as _, Result, ensure};
 
@@ -95,4 +96,35 @@ pub(crate) fn version() -> Result<String> {
     let table: toml::Table = manifest.parse()?;
     let version = table["workspace"]["package"]["version"].as_str().context("a version")?;
     Ok(version.to_owned())
+}
+
+/// Builds the program, and returns its path. The profile `quick` is `release` without optimization at link
+/// time.
+pub(crate) fn build(profile: &str) -> Result<PathBuf> {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    let built = Command::new(cargo)
+        .args(["build", "--profile", profile, "--locked", "--quiet", "--package", "plotplan"])
+        .args(["--message-format", "json"])
+        .current_dir(crate::top())
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot run cargo")?;
+    ensure!(built.status.success(), "the build failed");
+    // Cargo's messages name the binary, for any target folder.
+    let executable = String::from_utf8_lossy(&built.stdout)
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter(|message| message["target"]["name"] == "plotplan")
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from));
+    executable.context("cargo did not report the path of the binary")
+}
+
+/// CPU time that a process has used, by Linux's `/proc/PID/stat`: fields 14 and 15, user and system
+/// time in hundredths of a second (`proc_pid_stat(5)`; `USER_HZ` is 100 on all its architectures).
+pub(crate) fn cpu_time(process: u32) -> Option<Duration> {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The name of the program, field 2, is in parentheses and may contain blanks.
+    let fields: Vec<&str> = stat.rsplit_once(") ")?.1.split(' ').collect();
+    let hundredths: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+    Some(Duration::from_millis(10 * hundredths))
 }

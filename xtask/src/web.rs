@@ -37,7 +37,7 @@ pub(crate) fn build() -> Result<PathBuf> {
     let top = std::path::absolute(crate::top())?;
     crate::ci::add_target(TARGET)?;
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "-p", "plotplan-studio-wasm"]);
+    cargo.args(["build", "--locked", "--profile", "quick", "--target", TARGET, "-p", "plotplan-studio-wasm"]);
     let status = cargo.current_dir(&top).status().context("cannot run cargo")?;
     ensure!(status.success(), "cargo build for {TARGET}: {status}");
     let folder = top.join("target/studio");
@@ -63,7 +63,7 @@ pub(crate) fn build() -> Result<PathBuf> {
     }
     make(folder.join("examples/house.hpgl"), read(&top.join("examples/house.hpgl"))?)?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| top.join("target"), PathBuf::from);
-    let wasm = target.join(TARGET).join("web/studio_wasm.wasm");
+    let wasm = target.join(TARGET).join("quick/studio_wasm.wasm");
     make(folder.join("studio.wasm"), read(&wasm)?)?;
     make(folder.join("index.html"), page(&top)?.into_bytes())?;
     for file in files_below(&folder)?.iter().filter(|file| !made.contains(*file)) {

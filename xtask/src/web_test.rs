@@ -20,8 +20,8 @@ const PAGES: &[(&str, &str)] = &[
     ("simulation.html", "simulate examples/house.hpgl --machine coaxial --fit --setpoints interpolated"),
 ];
 
-/// Installs what is missing, type-checks the viewer, writes the pages with `program` (by default the
-/// release build) and runs the tests. With `write`, screenshots become the new references.
+/// Installs what is missing, type-checks the viewer, writes the pages with `program` (by default it is
+/// built) and runs the tests. With `write`, screenshots become the new references.
 pub(crate) fn run(program: Option<&str>, write: bool) -> Result<bool> {
     let top = crate::top();
     let (tests, pages) = (top.join("viewer/test"), top.join("target/web-test"));
@@ -30,16 +30,12 @@ pub(crate) fn run(program: Option<&str>, write: bool) -> Result<bool> {
         execute(Command::new(tests.join("node_modules/.bin/tsc")).args(["-p", project]))?;
     }
     let studio = crate::web::build()?;
-    let program = if let Some(program) = program {
-        PathBuf::from(program)
-    } else {
-        execute(Command::new("cargo").args(["build", "--release", "--locked", "-p", "plotplan"]))?;
-        top.join("target/release/plotplan")
-    };
+    let program =
+        if let Some(program) = program { PathBuf::from(program) } else { crate::programs::build("quick")? };
     std::fs::create_dir_all(&pages).with_context(|| format!("{}", pages.display()))?;
     write_pages(&program, &pages)?;
     let mut command = Command::new("node");
-    command.args(["--test", "--test-reporter=spec", "--test-concurrency=1"]);
+    command.args(["--test", "--test-reporter=spec", "--test-concurrency=2"]);
     command.args(["viewer/test/viewer.test.mjs", "viewer/test/studio.test.mjs"]);
     command.env("PLOTPLAN_PAGES", std::path::absolute(&pages)?);
     command.env("PLOTPLAN_PROGRAM", std::path::absolute(&program)?);

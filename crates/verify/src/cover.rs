@@ -88,7 +88,10 @@ impl Cover {
         let cell = piece.length / f64::from(piece.cells);
         // The cells within the radius along the piece.
         let (first, last) = if piece.length > 0.0 {
-            (((low - radius) / cell) as usize, (((high + radius) / cell) as usize).saturating_add(1).min(count))
+            (
+                ((low - radius) / cell) as usize,
+                (((high + radius) / cell) as usize).saturating_add(1).min(count),
+            )
         } else {
             (0, 1)
         };
@@ -117,7 +120,9 @@ impl Cover {
                 let kept = bound(square as f32, error, limit);
                 *covered = if kept < *covered { kept } else { *covered };
             }
-            *worst = cells.iter().fold(0.0, |largest, covered| if *covered > largest { *covered } else { largest });
+            *worst = cells
+                .iter()
+                .fold(0.0, |largest, covered| if *covered > largest { *covered } else { largest });
         }
     }
 

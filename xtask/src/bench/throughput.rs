@@ -14,7 +14,7 @@ use compiler::pipeline::{self, Request, Step};
 use planner::{PlacementOptions, Scale};
 
 use super::{Random, request};
-use crate::programs::cpu_seconds;
+use crate::programs::{cpu_seconds, cpu_time};
 
 /// A drawing on a machine.
 struct Case {
@@ -31,22 +31,8 @@ struct Case {
 }
 
 const CASES: [Case; 2] = [
-    Case {
-        name: "arcs",
-        machine: "corexy",
-        make: small_arcs,
-        fit: false,
-        before_s: 33.0,
-        goal_s: 12.0,
-    },
-    Case {
-        name: "streets",
-        machine: "coaxial",
-        make: street_map,
-        fit: true,
-        before_s: 8.3,
-        goal_s: 4.0,
-    },
+    Case { name: "arcs", machine: "corexy", make: small_arcs, fit: false, before_s: 33.0, goal_s: 12.0 },
+    Case { name: "streets", machine: "coaxial", make: street_map, fit: true, before_s: 8.3, goal_s: 4.0 },
 ];
 
 /// Largest share of the verification.
@@ -66,7 +52,8 @@ pub(super) fn run(other: Option<&Path>) -> Result<bool> {
         for (step, seconds) in &steps {
             println!("  {step:<12} {seconds:>7.2} s  {:>3.0} %", 100.0 * seconds / all);
         }
-        let verification = steps.iter().find(|(step, _)| *step == "verifying").map_or(0.0, |step| step.1 / all);
+        let verification =
+            steps.iter().find(|(step, _)| *step == "verifying").map_or(0.0, |step| step.1 / all);
         let before = other.map_or(Ok(case.before_s), |program| compare(program, &case, &text))?;
         let holds = all <= case.goal_s && verification <= VERIFICATION;
         met &= holds;
@@ -126,11 +113,7 @@ fn steps(case: &Case, text: &str) -> Result<Vec<(&'static str, f64)>> {
 
 /// CPU time of all threads of this process, s, to 10 ms.
 fn process_cpu_s() -> Result<f64> {
-    const TICKS_A_SECOND: f64 = 100.0;
-    let stat = std::fs::read_to_string("/proc/self/stat").context("CPU time needs Linux")?;
-    // After the name in parentheses: state is field 3, user and system time are fields 14 and 15 (proc(5)).
-    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
-    Ok(fields.skip(11).take(2).filter_map(|field| field.parse::<f64>().ok()).sum::<f64>() / TICKS_A_SECOND)
+    Ok(cpu_time(std::process::id()).context("CPU time needs Linux")?.as_secs_f64())
 }
 
 /// CPU time of `convert` by another program, s.
