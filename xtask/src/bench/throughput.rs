@@ -132,13 +132,13 @@ fn compare(program: &Path, case: &Case, text: &str) -> Result<f64> {
 /// 32,612 arcs of 2.2 mm in the mean, about 1.6 MB: rows of small arcs like the scales of a fish.
 fn small_arcs() -> String {
     const ARCS: u32 = 32_612;
-    const PER_ROW: u32 = 181;
+    const PER_ROW: u32 = 140;
     let mut random = Random(15);
     let mut text = "IN;SP1;\n".to_owned();
     for index in 0..ARCS {
         let (column, row) = (f64::from(index % PER_ROW), f64::from(index / PER_ROW));
         let radius = (0.4 + random.up_to(0.8)) * UNITS_MM;
-        let (x, y) = ((2.0 + 1.4 * column) * UNITS_MM, (2.0 + 1.0 * row) * UNITS_MM);
+        let (x, y) = ((3.0 + 1.35 * column) * UNITS_MM, (3.0 + 0.75 * row) * UNITS_MM);
         let start = random.up_to(TAU);
         let sweep = 60.0 + random.up_to(200.0);
         let (from_x, from_y) = (x + radius * start.cos(), y + radius * start.sin());
