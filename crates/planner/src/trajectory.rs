@@ -29,7 +29,7 @@ const BATCH: usize = 4096;
 
 /// A plan with at most this number of phases is cached, so that its rows can be generated again
 /// without planning again.
-const CACHED_PHASES: usize = 1 << 20;
+const CACHED_PHASES: usize = 1 << 21;
 
 /// The largest number of rows of a plan: 11 days at a period of 1 ms.
 const MAX_ROWS: u64 = 1_000_000_000;

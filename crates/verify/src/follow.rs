@@ -15,6 +15,7 @@ use std::ops::Range;
 use drawing::{Point, Rect, distance};
 
 use crate::{
+    near::Candidate,
     run::Run,
     target::{PenTarget, meet},
 };
@@ -67,7 +68,7 @@ impl Follower {
         run: &Run,
         bounds: Rect,
         radius: f64,
-        candidates: &mut Vec<(f64, u32)>,
+        candidates: &mut Vec<Candidate>,
     ) -> bool {
         if self.followed.is_empty() {
             return false;
@@ -80,7 +81,7 @@ impl Follower {
         self.followed.retain(|stretch| is_near(stretch, strokes, run.from, FOLLOWED * radius));
         self.join(strokes, bounds, TOUCH * radius, meets);
         candidates.clear();
-        candidates.extend(self.followed.iter().cloned().flatten().map(|index| (0.0, index)));
+        candidates.extend(self.followed.iter().cloned().flatten().map(Candidate::new));
         // Near enough that a plan that holds need not look further.
         let near = |point: Point| {
             self.followed.iter().any(|stretch| is_near(stretch, strokes, point, FOLLOWED * radius))
@@ -128,18 +129,12 @@ impl Follower {
     }
 
     /// Follows the stretches of strokes near `point` from now on.
-    pub(crate) fn start(
-        &mut self,
-        strokes: &PenTarget,
-        point: Point,
-        radius: f64,
-        candidates: &[(f64, u32)],
-    ) {
+    pub(crate) fn start(&mut self, strokes: &PenTarget, point: Point, radius: f64, candidates: &[Candidate]) {
         let is_near = |index: &u32| {
             let piece = &strokes.pieces[*index as usize];
             piece.distance(piece.local(point)) <= radius
         };
-        let mut near: Vec<u32> = candidates.iter().map(|(_, index)| *index).filter(is_near).collect();
+        let mut near: Vec<u32> = candidates.iter().map(|candidate| candidate.index).filter(is_near).collect();
         near.sort_unstable();
         for index in near {
             let stroke = strokes.pieces[index as usize].stroke;
@@ -205,7 +200,7 @@ mod tests {
             .filter_map(|line| Stroke::polyline(Pen(1), line.map(Point::from).to_vec(), Span::default()));
         let strokes = Target::new(&Drawing { strokes: strokes.collect() }, 0.1).pens.remove(0);
         let mut follower = Follower::default();
-        let mut candidates: Vec<(f64, u32)> = (0..strokes.pieces.len() as u32).map(|i| (0.0, i)).collect();
+        let mut candidates: Vec<Candidate> = (0..strokes.pieces.len() as u32).map(Candidate::new).collect();
         follower.start(&strokes, Point::ZERO, RADIUS, &candidates);
         for step in 0..(end / STEP) as usize {
             let x = step as f64 * STEP;
@@ -215,7 +210,7 @@ mod tests {
             assert!(follower.advance(&strokes, &run, bounds, RADIUS, &mut candidates), "lost at {x}");
         }
         let mut found: Vec<u32> =
-            candidates.iter().map(|(_, index)| strokes.pieces[*index as usize].stroke).collect();
+            candidates.iter().map(|candidate| strokes.pieces[candidate.index as usize].stroke).collect();
         found.dedup();
         found
     }

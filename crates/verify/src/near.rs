@@ -18,11 +18,25 @@ const TIGHTEST: f64 = 1.0 / 5000.0;
 /// Largest number of halvings of a run.
 pub(crate) const HALVINGS: u32 = 24;
 
+/// A piece that may be the nearest one somewhere on a run or on a part of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) index: u32,
+    /// The distances of the part's start, middle and end from the piece, mm, once they are known.
+    pub(crate) at: [f64; 3],
+}
+
+impl Candidate {
+    pub(crate) fn new(index: u32) -> Self {
+        Self { index, at: [f64::NAN; 3] }
+    }
+}
+
 /// The pieces near a run.
 pub(crate) struct Near<'a> {
     pub(crate) strokes: &'a PenTarget,
     /// All pieces within `radius` of the run; behind them, those that matter for a part of it.
-    pub(crate) candidates: &'a mut Vec<(f64, u32)>,
+    pub(crate) candidates: &'a mut Vec<Candidate>,
     pub(crate) radius: f64,
     pub(crate) tolerance: f64,
     /// Bounds up to this value may be loose.
@@ -34,10 +48,11 @@ impl Near<'_> {
     /// (between them the distance is below the linear interpolation) and the length they hold for.
     ///
     /// `ends` are the two points with their distances, `common` the distances of both points from
-    /// one piece, `among` the candidates.
+    /// one piece, `among` the candidates; `known` says which of their distances are those of the points.
     pub(crate) fn bound(
         &mut self,
         among: Range<usize>,
+        known: [usize; 2],
         ends: [(Point, f64); 2],
         common: [f64; 2],
         halvings: u32,
@@ -62,33 +77,34 @@ impl Near<'_> {
         let first = self.candidates.len();
         let mut nearest = f64::INFINITY;
         for candidate in among {
-            let index = self.candidates[candidate].1;
+            let Candidate { index, at } = self.candidates[candidate];
             let piece = &self.strokes.pieces[index as usize];
             let here = piece.distance(piece.local(middle));
             nearest = nearest.min(here);
-            self.candidates.push((here, index));
+            self.candidates.push(Candidate { index, at: [at[known[0]], here, at[known[1]]] });
         }
         if nearest > self.radius {
-            let found = self.strokes.nearest(middle);
-            nearest = found.0;
-            self.candidates.push(found);
+            let (here, index) = self.strokes.nearest(middle);
+            nearest = here;
+            let [at_from, at_end] = self.strokes.pieces[index as usize].distances([from, end]);
+            self.candidates.push(Candidate { index, at: [at_from, here, at_end] });
         }
         // Half a length away a piece can be nearer by half a length, and the nearest one farther.
         let mut kept = first;
         let mut halves = [[f64::INFINITY; 2]; 2];
-        for candidate in first..self.candidates.len() {
-            let (here, index) = self.candidates[candidate];
+        for index in first..self.candidates.len() {
+            let candidate = self.candidates[index];
+            let [at_from, here, at_end] = candidate.at;
             if here > nearest + length {
                 continue;
             }
-            self.candidates[kept] = (here, index);
+            self.candidates[kept] = candidate;
             kept += 1;
-            let [at_from, at_end] = self.strokes.pieces[index as usize].distances([from, end]);
             halves = [better(halves[0], [at_from, here]), better(halves[1], [here, at_end])];
         }
         self.candidates.truncate(kept);
-        self.bound(first..kept, [ends[0], (middle, nearest)], halves[0], halvings - 1, to);
-        self.bound(first..kept, [(middle, nearest), ends[1]], halves[1], halvings - 1, to);
+        self.bound(first..kept, [0, 1], [ends[0], (middle, nearest)], halves[0], halvings - 1, to);
+        self.bound(first..kept, [1, 2], [(middle, nearest), ends[1]], halves[1], halvings - 1, to);
         self.candidates.truncate(first);
     }
 }

@@ -13,7 +13,7 @@ use crate::{
     cover::{Cover, LocalRun, UncoveredPart},
     follow::{CROWD, FOLLOWED, Follower},
     histogram::Histogram,
-    near::{HALVINGS, Near, better},
+    near::{Candidate, HALVINGS, Near, better},
     run::{At, Chain, Run},
     target::{Line, PenTarget, Target, meet},
 };
@@ -65,8 +65,8 @@ pub(crate) struct Trace {
     follower: Follower,
     /// Bounds along a run: at either end of a part of it, and the length of the part.
     bounds: Vec<([f64; 2], f64)>,
-    /// Working memory of [`Near::bound`]: distance and index of pieces.
-    candidates: Vec<(f64, u32)>,
+    /// The pieces that are examined for the run.
+    candidates: Vec<Candidate>,
     distances: Histogram,
     worst: Option<Worst>,
     pub(crate) length: f64,
@@ -205,7 +205,7 @@ impl Trace {
                 let radius = self.radius + strokes.line_error();
                 self.candidates.clear();
                 let alongside = near.filter(|(line, _)| line.is_alongside(run, radius));
-                self.candidates.extend(alongside.map(|(_, index)| (0.0, *index)));
+                self.candidates.extend(alongside.map(|(_, index)| Candidate::new(*index)));
                 if !self.candidates.is_empty() {
                     return Scope::Alongside;
                 }
@@ -217,14 +217,15 @@ impl Trace {
 
     /// For each end of the run the nearest piece with its distance; and the distances of both ends
     /// from that one piece for which the larger distance is smallest.
-    fn nearest_to_ends(&self, strokes: &PenTarget, run: &Run) -> ([(f64, u32); 2], [f64; 2]) {
+    fn nearest_to_ends(&mut self, strokes: &PenTarget, run: &Run) -> ([(f64, u32); 2], [f64; 2]) {
         let mut nearest = [(f64::INFINITY, 0_u32); 2];
         let mut common = [f64::INFINITY; 2];
-        for &(_, index) in &self.candidates {
-            let distances = strokes.pieces[index as usize].distances([run.from, run.to]);
+        for Candidate { index, at } in &mut self.candidates {
+            let distances = strokes.pieces[*index as usize].distances([run.from, run.to]);
+            (at[0], at[2]) = (distances[0], distances[1]);
             for (best, distance) in nearest.iter_mut().zip(distances) {
                 if distance < best.0 {
-                    *best = (distance, index);
+                    *best = (distance, *index);
                 }
             }
             common = better(common, distances);
@@ -259,7 +260,7 @@ impl Trace {
         let all = 0..near.candidates.len();
         let bounds = &mut self.bounds;
         bounds.clear();
-        near.bound(all, ends, common, HALVINGS, &mut |[from, to], length| {
+        near.bound(all, [0, 2], ends, common, HALVINGS, &mut |[from, to], length| {
             largest = largest.max(from.max(to) + run.error);
             bounds.push(([from, to], length));
         });
@@ -291,8 +292,8 @@ impl Trace {
 
     /// Updates the cover of the candidates.
     fn cover_all(&mut self, strokes: &PenTarget, run: &Run, before: Option<&Run>) {
-        for &(_, index) in &self.candidates {
-            let piece = &strokes.pieces[index as usize];
+        for candidate in &self.candidates {
+            let piece = &strokes.pieces[candidate.index as usize];
             let local = LocalRun::new(piece, run);
             self.cover.run(piece, &local, self.radius);
             if let Some(before) = before {
@@ -312,7 +313,7 @@ impl Trace {
                 meet(piece.bounds(), bounds) && piece.may_be_near(run.from, run.to, radius)
             }
         };
-        self.candidates.extend(self.near.iter().filter(may_be_near).map(|(_, index)| (0.0, *index)));
+        self.candidates.extend(self.near.iter().filter(may_be_near).map(|(_, index)| Candidate::new(*index)));
     }
 
     /// Ensures that `near` holds every piece that meets `bounds`. A wider list is kept while the

@@ -102,7 +102,7 @@ fn steps(case: &Case, text: &str) -> Result<Vec<(&'static str, f64)>> {
         "\n{}: {} strokes, {:.1} m of ink, {:.0} s, {} rows, certificate {}",
         case.name,
         compiled.strokes,
-        document.pages[0].drawing.strokes.iter().map(drawing::Stroke::length).sum::<f64>() * 1e-3,
+        document.pages[0].drawing.length() * 1e-3,
         times.drawing_s + times.travel_s,
         compiled.trajectory.row_count(),
         if compiled.certificate.holds { "holds" } else { "does not hold" },
