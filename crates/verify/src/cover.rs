@@ -75,6 +75,11 @@ impl Cover {
         }
     }
 
+    /// Whether all cells of a piece are covered to within `mm`; false if that is not known. NaN is not.
+    pub(crate) fn is_nearer(&self, piece: &Piece, mm: f64) -> bool {
+        piece.cells as usize <= BLOCK && f64::from(self.blocks[piece.first_block as usize]) <= mm
+    }
+
     /// Updates the cells of a piece with the distance to a run.
     pub(crate) fn run(&mut self, piece: &Piece, run: &LocalRun, radius: f64) {
         let [(x0, y0), (x1, y1)] = run.ends;

@@ -30,6 +30,12 @@ impl Candidate {
     pub(crate) fn new(index: u32) -> Self {
         Self { index, at: [f64::NAN; 3] }
     }
+
+    /// Lower bound of the distance between two points that are `length` apart, at which the distances are
+    /// those of `at` with these indices: distances are 1-Lipschitz. NaN while they are not known.
+    pub(crate) fn at_least(&self, [from, end]: [usize; 2], length: f64) -> f64 {
+        0.5 * (self.at[from] + self.at[end] - length)
+    }
 }
 
 /// The pieces near a run.
@@ -89,18 +95,21 @@ impl Near<'_> {
             let [at_from, at_end] = self.strokes.pieces[index as usize].distances([from, end]);
             self.candidates.push(Candidate { index, at: [at_from, here, at_end] });
         }
-        // Half a length away a piece can be nearer by half a length, and the nearest one farther.
-        let mut kept = first;
         let mut halves = [[f64::INFINITY; 2]; 2];
+        for Candidate { at: [at_from, here, at_end], .. } in &self.candidates[first..] {
+            halves = [better(halves[0], [*at_from, *here]), better(halves[1], [*here, *at_end])];
+        }
+        // Those that may be nearer than the best bound on either half.
+        let most = halves.map(|[at_start, at_end]| at_start.max(at_end));
+        let mut kept = first;
         for index in first..self.candidates.len() {
             let candidate = self.candidates[index];
-            let [at_from, here, at_end] = candidate.at;
-            if here > nearest + length {
-                continue;
+            if candidate.at_least([0, 1], 0.5 * length) <= most[0]
+                || candidate.at_least([1, 2], 0.5 * length) <= most[1]
+            {
+                self.candidates[kept] = candidate;
+                kept += 1;
             }
-            self.candidates[kept] = candidate;
-            kept += 1;
-            halves = [better(halves[0], [at_from, here]), better(halves[1], [here, at_end])];
         }
         self.candidates.truncate(kept);
         self.bound(first..kept, [0, 1], [ends[0], (middle, nearest)], halves[0], halvings - 1, to);

@@ -167,8 +167,8 @@ impl Trace {
                     self.cover_all(strokes, run, before.as_ref());
                 }
             }
-            self.cover_all(strokes, &run, before.as_ref());
             let (nearest, common) = self.nearest_to_ends(strokes, &run);
+            self.cover_all(strokes, &run, before.as_ref());
             if self.follows {
                 let is_crowded = scope == Scope::Alongside || self.candidates.len() > CROWD;
                 if scope != Scope::Followed && is_crowded {
@@ -249,6 +249,8 @@ impl Trace {
         common: [f64; 2],
     ) -> f64 {
         let ends = [(run.from, nearest[0].0), (run.to, nearest[1].0)];
+        let (length, most) = (distance(run.from, run.to), common[0].max(common[1]));
+        self.candidates.retain(|candidate| candidate.at_least([0, 2], length) <= most);
         let mut near = Near {
             strokes,
             candidates: &mut self.candidates,
@@ -290,10 +292,14 @@ impl Trace {
         }
     }
 
-    /// Updates the cover of the candidates.
+    /// Updates the cover of the candidates, but not of those that nearer ink has covered.
     fn cover_all(&mut self, strokes: &PenTarget, run: &Run, before: Option<&Run>) {
+        let length = distance(run.from, run.to);
         for candidate in &self.candidates {
             let piece = &strokes.pieces[candidate.index as usize];
+            if self.cover.is_nearer(piece, candidate.at_least([0, 2], length) - piece.error) {
+                continue;
+            }
             let local = LocalRun::new(piece, run);
             self.cover.run(piece, &local, self.radius);
             if let Some(before) = before {
