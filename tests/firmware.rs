@@ -782,14 +782,18 @@ fn formats_page_lists_every_format() {
 /// Both durations that `convert` reports; the settings are those of the file.
 #[test]
 fn grbl_keeps_to_the_plan() {
-    let files = [
+    const FILES: [&str; 8] = [
         "examples/zot.hpgl",
         "examples/house.hpgl",
+        "examples/rings.svg",
+        "examples/rosette.hpgl",
+        "examples/spirograph.hpgl",
+        "examples/surface.hpgl",
         "tests/drawings/spiral.hpgl",
         "tests/drawings/labels.hpgl",
     ];
-    for machine in ["cartesian", "corexy", "coaxial"] {
-        for file in files {
+    let check = |machine: &str| {
+        for file in FILES {
             let text = convert(file, machine, "gcode-grbl", &[]);
             let (times, settings) = text.split_once('\n').expect("lines");
             let settings = settings.lines().take(2).collect::<Vec<_>>().join(" ");
@@ -797,6 +801,27 @@ fn grbl_keeps_to_the_plan() {
             let share = times.split(['(', '%']).nth(1).and_then(|share| share.trim().parse::<f64>().ok());
             let share = share.expect(times);
             assert!(share.abs() <= 2.0, "{file}, {machine}: {times}");
+            let chords = text.lines().take(4).any(|line| line.ends_with("mm of the plan's path"));
+            assert_eq!(chords, file.contains("rosette"), "{file}, {machine}");
         }
-    }
+    };
+    std::thread::scope(|scope| {
+        for machine in ["cartesian", "corexy", "coaxial"] {
+            scope.spawn(move || check(machine));
+        }
+    });
+}
+
+/// Chords of the plan's path take what it leaves of the tolerance.
+#[test]
+fn gcode_ink_along_the_plan_is_within_the_tolerance() {
+    let file = "examples/rosette.hpgl";
+    let plan = plan(file, "cartesian", &[]);
+    let text = convert(file, "cartesian", "gcode-grbl", &[]);
+    assert!(text.lines().take(4).any(|line| line.contains("of 17 strokes: chords within")));
+    let ink = feed(&mut *emulator("gcode-grbl"), &text, '\n').lines();
+    let drawing = placed(file, &plan);
+    let certificate = measure(&ruler(Cartesian), &with_one_pen(drawing.clone()), &ink, FINE);
+    // Three decimals.
+    within(file, &certificate, &with_one_pen(drawing), TOLERANCE + 0.001);
 }

@@ -235,7 +235,8 @@ fn encode(backend: &dyn Backend, planned: &Planned, out: &mut Vec<u8>) -> Result
         || -> RowIter<'_> { Box::new(planned.rows.iter().copied().zip(planned.exact.iter().copied())) };
     let source =
         PlanSource::new(&planned.header, &rows).on_machine(&planned.machine).of_drawing(&planned.drawn);
-    backend.write(&source, &EncodeOptions::default(), out).map_err(|error: WriteError| unwritten(error))?;
+    let encode = EncodeOptions { spare_mm: planned.spare_mm, ..EncodeOptions::default() };
+    backend.write(&source, &encode, out).map_err(|error: WriteError| unwritten(error))?;
     Ok(losses)
 }
 

@@ -74,6 +74,8 @@ pub(crate) struct Planned {
     placed: Drawing,
     pub(crate) summary: Summary,
     pub(crate) certificate: CertificateReport,
+    /// What the path leaves of the tolerance, mm.
+    pub(crate) spare_mm: f64,
     beyond_sheet_mm: f64,
 }
 
@@ -350,6 +352,7 @@ impl Studio {
         }
         let (rows, exact) = compiled.trajectory.rows().map(|row| (row.row, row.exact)).unzip();
         let (summary, certificate) = (Summary::of(&compiled), CertificateReport::of(&compiled.certificate));
+        let spare_mm = compiled.certificate.spare_mm();
         let (header, drawn) = (compiled.header.clone(), compiled.ordered().clone());
         let (placed, beyond_sheet_mm) = (compiled.placed.clone(), compiled.beyond_sheet_mm);
         drop(compiled);
@@ -367,6 +370,7 @@ impl Studio {
             placed,
             summary,
             certificate,
+            spare_mm,
             beyond_sheet_mm,
         };
         self.planned = Some(planned.clone());

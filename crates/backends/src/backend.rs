@@ -327,6 +327,8 @@ pub struct EncodeOptions {
     pub pen_positions: Option<(f64, f64)>,
     /// Moves that every version of the firmware executes.
     pub legacy_moves: bool,
+    /// What chords of the plan's path may deviate from it, mm: the part of the tolerance that the plan leaves.
+    pub spare_mm: f64,
 }
 
 /// How a program is sent.

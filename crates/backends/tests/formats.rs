@@ -108,6 +108,7 @@ fn written() -> Vec<(&'static str, String)> {
         pen_actuator: Some(PenActuator::Servo),
         pen_positions: Some((40.0, 90.0)),
         legacy_moves: false,
+        spare_mm: 0.0,
     };
     let formats = backends::ALL.iter().filter(|backend| backend.format_help().is_some());
     formats

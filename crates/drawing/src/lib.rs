@@ -45,6 +45,7 @@ mod hatch;
 mod lattice;
 mod path;
 mod segment;
+mod simplify;
 mod stroke;
 mod strokes;
 
@@ -57,5 +58,6 @@ pub use kurbo::{Affine, CubicBez, Line, Point, Rect, Vec2};
 pub use lattice::Pitch;
 pub use path::Trail;
 pub use segment::Segment;
+pub use simplify::kept_vertices;
 pub use stroke::{Pen, Span, Stroke};
 pub use strokes::{IntoIter, Iter, Lettering, Strokes};

@@ -47,6 +47,15 @@ pub struct Certificate {
     pub dots: u64,
 }
 
+impl Certificate {
+    /// What the path through the exact motor positions leaves of the tolerance, mm; through the whole ticks if only
+    /// those are known.
+    pub fn spare_mm(&self) -> f64 {
+        let deviation = self.before_rounding.as_ref().unwrap_or(&self.after_rounding);
+        (self.tolerance_mm - deviation.max_mm()).max(0.0)
+    }
+}
+
 /// The two directed Hausdorff distances between ink and drawing, pen by pen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {

@@ -9,10 +9,11 @@
 use std::f64::consts::PI;
 use std::io::Write;
 
-use drawing::{Drawing, EllipticArc, Point, Segment};
+use drawing::{Drawing, EllipticArc, Point, Segment, Stroke};
 use kinematics::PenServo;
 
 use crate::WriteError;
+use crate::setpoint::at_rest;
 use crate::{Line, Setpoint};
 use plan::Row;
 use plan::file::text::Text;
@@ -200,10 +201,22 @@ impl Program<'_> {
         }
         let mut points = Vec::new();
         segment.flatten(self.options.chord_mm, |point| points.push(point));
+        self.chords(&points, mm_s);
+    }
+
+    fn chords(&mut self, points: &[Point], mm_s: f64) {
         for point in points {
-            if !same(self.here, point) {
-                self.line(point, mm_s);
+            if !same(self.here, *point) {
+                self.line(*point, mm_s);
             }
+        }
+    }
+
+    /// A stroke, from its start.
+    fn route(&mut self, stroke: &Stroke, route: Route<'_>, mm_s: f64) {
+        match route {
+            Route::Drawn => stroke.segments().for_each(|segment| self.segment(&segment, mm_s)),
+            Route::Chords(points) => self.chords(points, mm_s),
         }
     }
 }
@@ -247,10 +260,29 @@ pub(super) fn pen(options: &Options, down: bool) -> Vec<Line> {
     program.lines
 }
 
-/// The lines that draw `drawing` (machine mm, in its order), then travel to `park`. `speeds_mm_s` has the speed of each
-/// stroke. Without `pauses` it draws with one pen.
+/// What is written of a stroke.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Route<'a> {
+    /// Its own lines, arcs and curves.
+    Drawn,
+    /// Chords of the path that the plan has for it, from the first point to the last.
+    Chords(&'a [Point]),
+}
+
+impl Route<'_> {
+    fn start(self, stroke: &Stroke) -> Point {
+        match self {
+            Route::Drawn => stroke.start(),
+            Route::Chords(points) => points.first().copied().unwrap_or_else(|| stroke.start()),
+        }
+    }
+}
+
+/// The lines that draw `drawing` (machine mm, in its order), then travel to `park`. `routes` and `speeds_mm_s` belong to
+/// its strokes. Without `pauses` it draws with one pen.
 pub(super) fn paths(
     drawing: &Drawing,
+    routes: &[Route<'_>],
     speeds_mm_s: &[f64],
     park: Point,
     options: &Options,
@@ -262,16 +294,14 @@ pub(super) fn paths(
     if let Some(first) = pen.filter(|first| drawing.strokes.iter().any(|stroke| stroke.pen != *first)) {
         program.change_pen(first.0, None);
     }
-    for (stroke, speed) in drawing.strokes.iter().zip(speeds_mm_s) {
+    for ((stroke, route), speed) in drawing.strokes.iter().zip(routes).zip(speeds_mm_s) {
         if pauses && pen != Some(stroke.pen) {
             pen = Some(stroke.pen);
             program.change_pen(stroke.pen.0, Some(park));
         }
-        program.travel(stroke.start());
+        program.travel(route.start(&stroke));
         program.pen(true);
-        for segment in stroke.segments() {
-            program.segment(&segment, *speed);
-        }
+        program.route(&stroke, *route, *speed);
         program.pen(false);
     }
     program.travel(park);
@@ -279,12 +309,10 @@ pub(super) fn paths(
 }
 
 /// The lines of one stroke, from the travel to its start.
-pub(super) fn stroke(stroke: &drawing::Stroke, options: &Options) -> Vec<Line> {
+pub(super) fn stroke(stroke: &Stroke, route: Route<'_>, options: &Options) -> Vec<Line> {
     let mut program = Program { options, lines: Vec::new(), here: None, feed: f64::NAN };
-    program.travel(stroke.start());
-    for segment in stroke.segments() {
-        program.segment(&segment, 1.0);
-    }
+    program.travel(route.start(stroke));
+    program.route(stroke, route, 1.0);
     program.lines
 }
 
@@ -428,9 +456,33 @@ pub(super) fn stroke_times_s(strokes: usize, rows: impl Iterator<Item = Row>) ->
     (0..strokes).map(|index| times_us.get(index).map_or(0.0, |us| *us as f64 * 1e-6)).collect()
 }
 
+/// The path of each stroke in a plan: where the pen is at each row that moves it down. `setpoints` are those of a plan
+/// of as many strokes.
+pub(super) fn stroke_paths(strokes: usize, setpoints: impl Iterator<Item = Setpoint>) -> Vec<Vec<Setpoint>> {
+    let mut paths: Vec<Vec<Setpoint>> = Vec::new();
+    let mut before: Option<Setpoint> = None;
+    let mut pen = 0;
+    for setpoint in setpoints {
+        if let Some(last) = before
+            && last.row.pen != 0
+        {
+            if last.row.pen != pen {
+                paths.push(vec![last]);
+            }
+            if let Some(path) = paths.last_mut().filter(|_| !at_rest(&last, &setpoint)) {
+                path.push(setpoint);
+            }
+        }
+        pen = before.map_or(0, |last| last.row.pen);
+        before = Some(setpoint);
+    }
+    paths.resize_with(strokes, Vec::new);
+    paths
+}
+
 /// The mean speed of each stroke in these times, mm/s, at most `max_mm_s`.
 pub(super) fn stroke_speeds_mm_s(drawing: &Drawing, times_s: &[f64], max_mm_s: f64) -> Vec<f64> {
-    let speed = |(stroke, seconds): (drawing::Stroke, &f64)| {
+    let speed = |(stroke, seconds): (Stroke, &f64)| {
         if *seconds > 0.0 { (stroke.length() / seconds).clamp(0.1, max_mm_s) } else { max_mm_s }
     };
     drawing.strokes.iter().zip(times_s).map(speed).collect()

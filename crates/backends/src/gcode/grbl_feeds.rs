@@ -1,9 +1,9 @@
 //! Settings of grbl for a machine, and a feed for every stroke with which grbl keeps to the plan's time.
 
-use drawing::{Drawing, Point};
+use drawing::{Drawing, Point, Stroke};
 use kinematics::Machine;
 
-use super::encode::{self, Options};
+use super::encode::{self, Options, Route};
 use super::grbl_time::{self, Command, GrblSettings, LINE_S, Model, Reader};
 use crate::Setpoint;
 
@@ -17,6 +17,9 @@ const MARGIN: f64 = 0.02;
 const STROKE_MARGIN: f64 = 0.005;
 const MOST_TRIALS: usize = 6;
 const RATE_TRIALS: usize = 7;
+/// Chords of the plan's path deviate from it by no more than this, even where the tolerance leaves more, mm: fewer
+/// lines gain nothing then.
+const CHORD_MM: f64 = 0.02;
 /// The slowest feed, mm/s.
 const LEAST_MM_S: f64 = 0.1;
 /// Where the firmware does the kinematics its resolution is not known: steps that do not matter.
@@ -26,6 +29,9 @@ const FINE_STEPS_PER_MM: f64 = 1000.0;
 #[derive(Clone, Debug)]
 pub(super) struct Feeds {
     pub(super) speeds_mm_s: Vec<f64>,
+    /// For each stroke chords of the plan's path, or nothing where its own lines and arcs are written.
+    chords: Vec<Option<Vec<Point>>>,
+    chord_mm: f64,
     pub(super) settings: GrblSettings,
     /// Time of the program without pen changes, s.
     pub(super) grbl_s: f64,
@@ -53,6 +59,19 @@ impl Feeds {
         [words.join(" "), limits.join(" ")]
     }
 
+    /// What is written of each stroke.
+    pub(super) fn routes(&self) -> Vec<Route<'_>> {
+        self.chords.iter().map(|chords| chords.as_deref().map_or(Route::Drawn, Route::Chords)).collect()
+    }
+
+    /// Strokes that are written as chords of the plan's path; nothing if there are none.
+    pub(super) fn chords_line(&self) -> Option<String> {
+        let (count, all) = (self.chords.iter().flatten().count(), self.chords.len());
+        (count > 0).then(|| {
+            format!("{count} of {all} strokes: chords within {:.4} mm of the plan's path", self.chord_mm)
+        })
+    }
+
     /// Both durations.
     pub(super) fn times_line(&self) -> String {
         let share = 100.0 * (self.grbl_s / self.plan_s - 1.0);
@@ -60,79 +79,177 @@ impl Feeds {
     }
 }
 
-/// Finds them. `times_s` has the time that the plan gives each stroke; `setpoints` is the plan.
-pub(super) fn find(
-    machine: &Machine,
-    drawing: &Drawing,
-    times_s: &[f64],
-    setpoints: impl Iterator<Item = Setpoint>,
-    park: Point,
-    options: &Options,
-    plan_s: f64,
-) -> Feeds {
-    let most_mm_s = machine.pen().max_speed_mm_s;
-    let is_linear = machine.mechanism().is_linear();
-    let mut settings =
-        if is_linear { settings_of(machine, options) } else { settings_from_plan(setpoints, options) };
-    let duration_s = |settings: &GrblSettings, speeds_mm_s: &[f64]| {
-        let lines = encode::paths(drawing, speeds_mm_s, park, options, false);
+/// What feeds are found for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Job<'a> {
+    pub(super) machine: &'a Machine,
+    pub(super) drawing: &'a Drawing,
+    /// The time that the plan gives each stroke, s.
+    pub(super) times_s: &'a [f64],
+    /// Where travel ends.
+    pub(super) park: Point,
+    pub(super) options: &'a Options,
+    /// The part of the tolerance that the plan leaves, mm.
+    pub(super) spare_mm: f64,
+    pub(super) plan_s: f64,
+}
+
+impl Job<'_> {
+    fn duration_s(&self, settings: &GrblSettings, routes: &[Route<'_>], speeds_mm_s: &[f64]) -> f64 {
+        let lines = encode::paths(self.drawing, routes, speeds_mm_s, self.park, self.options, false);
         grbl_time::duration_s(lines.iter().map(|line| line.text.as_str()), settings)
+    }
+
+    /// Chords of the plan's path for each stroke, and how far they deviate from it, mm; none where the straight line
+    /// between two rows deviates by more than the tolerance leaves.
+    fn chords(&self, setpoints: impl Iterator<Item = Setpoint>) -> (Vec<Option<Vec<Point>>>, f64) {
+        let paths = encode::stroke_paths(self.drawing.strokes.len(), setpoints);
+        // The motors move linearly between rows: so does the pen, or it deviates in the middle.
+        let middle = |pair: &[Setpoint]| {
+            let joints = [0, 1].map(|joint: usize| 0.5 * (pair[0].joints[joint] + pair[1].joints[joint]));
+            let chord = pair[0].at.midpoint(pair[1].at);
+            drawing::distance(self.machine.mechanism().forward(&joints.into()), chord)
+        };
+        let bow_mm = paths.iter().flat_map(|path| path.windows(2).map(middle)).fold(0.0, f64::max);
+        let chord_mm = (self.spare_mm - bow_mm).min(CHORD_MM);
+        if chord_mm < 0.0 {
+            return (vec![None; paths.len()], 0.0);
+        }
+        let chords = |path: Vec<Setpoint>| {
+            let points: Vec<Point> = path.iter().map(|setpoint| setpoint.at).collect();
+            let kept = drawing::kept_vertices(&points, chord_mm);
+            (kept.len() > 1).then(|| kept.into_iter().map(|index| points[index]).collect())
+        };
+        (paths.into_iter().map(chords).collect(), chord_mm + bow_mm)
+    }
+}
+
+/// The route of each stroke: its own, or the plan's if its own is slower than planned and the plan's is faster.
+fn faster<'a>(
+    job: &Job<'_>,
+    chords: &'a [Option<Vec<Point>>],
+    most_mm_s: f64,
+    settings: &GrblSettings,
+) -> Vec<Route<'a>> {
+    let choose = |((stroke, chords), time_s): ((Stroke, &'a Option<Vec<Point>>), &f64)| {
+        let duration_s = |route: Route<'_>| {
+            let commands = commands(&encode::stroke(&stroke, route, job.options));
+            stroke_duration_s(&commands, most_mm_s, settings)
+        };
+        let Some(chords) = chords else { return Route::Drawn };
+        let drawn_s = duration_s(Route::Drawn);
+        let is_slow = drawn_s > time_s * (1.0 + STROKE_MARGIN);
+        if is_slow && duration_s(Route::Chords(chords)) < drawn_s {
+            Route::Chords(chords)
+        } else {
+            Route::Drawn
+        }
     };
-    let fastest = vec![most_mm_s; drawing.strokes.len()];
+    job.drawing.strokes.iter().zip(chords).zip(job.times_s).map(choose).collect()
+}
+
+/// Finds them. `setpoints` gives the plan.
+pub(super) fn find<I: Iterator<Item = Setpoint>>(job: &Job<'_>, setpoints: impl Fn() -> I) -> Feeds {
+    let most_mm_s = job.machine.pen().max_speed_mm_s;
+    let is_linear = job.machine.mechanism().is_linear();
+    let mut settings = if is_linear {
+        settings_of(job.machine, job.options)
+    } else {
+        settings_from_plan(setpoints(), job.options)
+    };
+    let fastest = vec![most_mm_s; job.drawing.strokes.len()];
+    let mut routes = vec![Route::Drawn; job.drawing.strokes.len()];
+    let fits = |settings: &GrblSettings, routes: &[Route<'_>]| {
+        job.duration_s(settings, routes, &fastest) <= job.plan_s * (1.0 + MARGIN)
+    };
+    let mut is_fast = false;
     for deviation_mm in JUNCTION_DEVIATIONS_MM {
         settings.junction_deviation_mm = deviation_mm;
-        if duration_s(&settings, &fastest) <= plan_s * (1.0 + MARGIN) {
+        is_fast = fits(&settings, &routes);
+        if is_fast {
             break;
         }
     }
-    let strokes = drawing.strokes.iter().zip(times_s);
-    let mut speeds_mm_s: Vec<f64> = strokes
-        .map(|(stroke, time_s)| {
-            stroke_speed_mm_s(&encode::stroke(&stroke, options), *time_s, most_mm_s, &settings)
-        })
-        .collect();
-    let mut grbl_s = duration_s(&settings, &speeds_mm_s);
-    if grbl_s > plan_s * (1.0 + MARGIN) {
-        // Travel takes longer than planned: no stroke waits for that.
-        speeds_mm_s = fastest;
-        grbl_s = duration_s(&settings, &speeds_mm_s);
-    }
-    if grbl_s < plan_s * (1.0 - MARGIN) {
-        // Travel is faster than planned. Lower rates, above those of strokes, change nothing else.
-        let full = settings.max_rate_mm_s;
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..RATE_TRIALS {
-            let share = 0.5 * (low + high);
-            settings.max_rate_mm_s = full.map(|rate| (share * rate).max(most_mm_s.min(rate)).ceil());
-            grbl_s = duration_s(&settings, &speeds_mm_s);
-            if grbl_s < plan_s {
-                high = share;
-            } else {
-                low = share;
+    // Corners of the drawing that the plan smooths within the tolerance stop grbl: its own path, then.
+    let (chords, chord_mm) = if is_fast { (Vec::new(), 0.0) } else { job.chords(setpoints()) };
+    if !is_fast {
+        for deviation_mm in JUNCTION_DEVIATIONS_MM {
+            settings.junction_deviation_mm = deviation_mm;
+            routes = faster(job, &chords, most_mm_s, &settings);
+            if fits(&settings, &routes) {
+                break;
             }
         }
     }
-    Feeds { speeds_mm_s, settings, grbl_s, is_linear, plan_s }
+    let mut speeds_mm_s: Vec<f64> = (job.drawing.strokes.iter().zip(&routes).zip(job.times_s))
+        .map(|((stroke, route), time_s)| {
+            stroke_speed_mm_s(&encode::stroke(&stroke, *route, job.options), *time_s, most_mm_s, &settings)
+        })
+        .collect();
+    let mut grbl_s = job.duration_s(&settings, &routes, &speeds_mm_s);
+    if grbl_s > job.plan_s * (1.0 + MARGIN) {
+        // Travel takes longer than planned: no stroke waits for that.
+        speeds_mm_s.clone_from(&fastest);
+        grbl_s = job.duration_s(&settings, &routes, &speeds_mm_s);
+    }
+    if grbl_s < job.plan_s * (1.0 - MARGIN) {
+        grbl_s = slow_travel(job, &mut settings, &routes, &speeds_mm_s, most_mm_s);
+    }
+    let chords = routes.iter().map(|route| match route {
+        Route::Drawn => None,
+        Route::Chords(points) => Some(points.to_vec()),
+    });
+    Feeds { speeds_mm_s, chords: chords.collect(), chord_mm, settings, grbl_s, is_linear, plan_s: job.plan_s }
+}
+
+/// Travel is faster than planned. Lower rates, above those of strokes, change nothing else. Returns the new time, s.
+fn slow_travel(
+    job: &Job<'_>,
+    settings: &mut GrblSettings,
+    routes: &[Route<'_>],
+    speeds_mm_s: &[f64],
+    most_mm_s: f64,
+) -> f64 {
+    let full = settings.max_rate_mm_s;
+    let (mut low, mut high, mut grbl_s) = (0.0, 1.0, 0.0);
+    for _ in 0..RATE_TRIALS {
+        let share = 0.5 * (low + high);
+        settings.max_rate_mm_s = full.map(|rate| (share * rate).max(most_mm_s.min(rate)).ceil());
+        grbl_s = job.duration_s(settings, routes, speeds_mm_s);
+        if grbl_s < job.plan_s {
+            high = share;
+        } else {
+            low = share;
+        }
+    }
+    grbl_s
+}
+
+fn commands(lines: &[crate::Line]) -> Vec<Command> {
+    let mut reader = Reader::default();
+    lines.iter().map(|line| reader.read(&line.text)).collect()
+}
+
+/// The time of a stroke, the travel to its start first, at this feed.
+fn stroke_duration_s(commands: &[Command], feed_mm_s: f64, settings: &GrblSettings) -> f64 {
+    let Some(Command::Move { to: start, .. }) = commands.first().copied() else { return 0.0 };
+    let mut model = Model::new(settings, start);
+    for command in &commands[1..] {
+        model.pass_time(LINE_S);
+        model.execute(match *command {
+            Command::Move { to, feed_mm_s: Some(_), arc } => {
+                Command::Move { to, feed_mm_s: Some(feed_mm_s), arc }
+            }
+            other => other,
+        });
+    }
+    model.finish()
 }
 
 /// The feed with which a stroke takes this time, at most `most_mm_s`.
 fn stroke_speed_mm_s(lines: &[crate::Line], time_s: f64, most_mm_s: f64, settings: &GrblSettings) -> f64 {
-    let mut reader = Reader::default();
-    let commands: Vec<Command> = lines.iter().map(|line| reader.read(&line.text)).collect();
-    let Some(Command::Move { to: start, .. }) = commands.first().copied() else { return most_mm_s };
-    let duration_s = |feed_mm_s: f64| {
-        let mut model = Model::new(settings, start);
-        for command in &commands[1..] {
-            model.pass_time(LINE_S);
-            model.execute(match *command {
-                Command::Move { to, feed_mm_s: Some(_), arc } => {
-                    Command::Move { to, feed_mm_s: Some(feed_mm_s), arc }
-                }
-                other => other,
-            });
-        }
-        model.finish()
-    };
+    let commands = commands(lines);
+    let duration_s = |feed_mm_s: f64| stroke_duration_s(&commands, feed_mm_s, settings);
     // The time falls as the feed grows: bounds on both sides, and the inverse feed by the secant.
     let (mut high, mut high_s) = (most_mm_s, duration_s(most_mm_s));
     if high_s >= time_s || high_s <= 0.0 {

@@ -94,8 +94,17 @@ impl Paths {
         let times_s = encode::stroke_times_s(drawing.strokes.len(), plan.rows());
         let park = machine.mechanism().forward(&machine.start());
         let plan_s = plan.header().duration_us as f64 * 1e-6;
-        let setpoints = plan.setpoints(self.name())?;
-        Ok(Some(grbl_feeds::find(machine, drawing, &times_s, setpoints, park, &options, plan_s)))
+        let job = grbl_feeds::Job {
+            machine,
+            drawing,
+            times_s: &times_s,
+            park,
+            options: &options,
+            spare_mm: encode.spare_mm,
+            plan_s,
+        };
+        // The machine is known: `machine` is above.
+        Ok(Some(grbl_feeds::find(&job, || plan.setpoints(self.name()).into_iter().flatten())))
     }
 }
 
@@ -154,24 +163,30 @@ impl Backend for Paths {
         let (machine, drawing) = (plan.machine(self.name())?, plan.drawing(self.name())?);
         let park = machine.mechanism().forward(&machine.start());
         let feeds = self.feeds(plan, *encode)?;
-        let speeds_mm_s = if let Some(feeds) = feeds {
+        let mut lines = homing::lines(self.0, machine);
+        if let Some(feeds) = feeds {
             writeln!(out, "; {}", feeds.times_line())?;
             for settings in feeds.settings() {
                 writeln!(out, "; {settings}")?;
             }
-            feeds.speeds_mm_s
+            if let Some(chords) = feeds.chords_line() {
+                writeln!(out, "; {chords}")?;
+            }
+            let routes = feeds.routes();
+            lines.extend(encode::paths(drawing, &routes, &feeds.speeds_mm_s, park, &options, true));
         } else {
             let times_s = encode::stroke_times_s(drawing.strokes.len(), plan.rows());
-            encode::stroke_speeds_mm_s(drawing, &times_s, machine.pen().max_speed_mm_s)
-        };
-        let mut lines = homing::lines(self.0, machine);
-        lines.extend(encode::paths(drawing, &speeds_mm_s, park, &options, true));
+            let speeds_mm_s = encode::stroke_speeds_mm_s(drawing, &times_s, machine.pen().max_speed_mm_s);
+            let routes = vec![encode::Route::Drawn; drawing.strokes.len()];
+            lines.extend(encode::paths(drawing, &routes, &speeds_mm_s, park, &options, true));
+        }
         encode::write(&lines, out)
     }
 
     fn remarks(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Vec<String> {
         let Ok(Some(feeds)) = self.feeds(plan, *encode) else { return Vec::new() };
-        vec![feeds.times_line(), format!("with these settings: {}", feeds.settings().join(" "))]
+        let settings = format!("with these settings: {}", feeds.settings().join(" "));
+        [Some(feeds.times_line()), Some(settings), feeds.chords_line()].into_iter().flatten().collect()
     }
 
     fn program(&self, plan: &PlanSource<'_>, encode: &EncodeOptions) -> Result<Program, ProgramError> {

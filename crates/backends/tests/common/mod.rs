@@ -130,7 +130,12 @@ fn pen_settings() -> Vec<EncodeOptions> {
     let actuators = [None, Some(PenActuator::Servo), Some(PenActuator::Z)];
     let positions = [None, Some((30.0, 80.0))];
     let all = actuators.into_iter().flat_map(|pen_actuator| {
-        positions.map(|pen_positions| EncodeOptions { pen_actuator, pen_positions, legacy_moves: false })
+        positions.map(|pen_positions| EncodeOptions {
+            pen_actuator,
+            pen_positions,
+            legacy_moves: false,
+            spare_mm: 0.0,
+        })
     });
     all.collect()
 }

@@ -1,19 +1,10 @@
 //! Polyline simplification within a tolerance: many vertices only reflect the grid of the program
 //! that made the file.
 
-use drawing::{Line, Point, Segment};
-
-use super::tangent::distance;
+use drawing::{Line, Point, Segment, kept_vertices};
 
 /// Replaces sequences of lines by fewer lines, such that every point of either polyline is within
-/// `tolerance` mm of the other.
-///
-/// From each kept vertex a chord is extended over the following vertices as long as all of them lie
-/// within the tolerance of the chord and each step advances along it. Then the normal through any
-/// point of the chord also meets the polyline within the tolerance, so the bound holds in both
-/// directions. The directions from the kept vertex that satisfy the tolerance form an interval, the
-/// intersection of the cones that touch the disc around each vertex, so one pass is sufficient.
-/// Method: Reumann & Witkam 1974; Imai & Iri 1988 for the cone.
+/// `tolerance` mm of the other ([`drawing::kept_vertices`]).
 pub(super) fn simplify(pieces: Vec<Segment>, tolerance: f64) -> Vec<Segment> {
     let mut simplified = Vec::with_capacity(pieces.len());
     let mut run: Vec<Point> = Vec::new();
@@ -36,53 +27,9 @@ pub(super) fn simplify(pieces: Vec<Segment>, tolerance: f64) -> Vec<Segment> {
 }
 
 fn flush(run: &mut Vec<Point>, tolerance: f64, to: &mut Vec<Segment>) {
-    let mut from = 0;
-    while from + 1 < run.len() {
-        let end = farthest(run, from, tolerance);
-        to.push(Segment::Line(Line::new(run[from], run[end])));
-        from = end;
-    }
+    let kept = kept_vertices(run, tolerance);
+    to.extend(kept.windows(2).map(|pair| Segment::Line(Line::new(run[pair[0]], run[pair[1]]))));
     run.clear();
-}
-
-/// The last vertex that a chord from `from` can reach.
-fn farthest(run: &[Point], from: usize, tolerance: f64) -> usize {
-    let anchor = run[from];
-    // Angles are relative to the direction of the first step, which avoids wrapping.
-    let first = run[from + 1] - anchor;
-    let (mut low, mut high) = (-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2);
-    let mut end = from + 1;
-    let narrow = |point: Point, low: &mut f64, high: &mut f64| {
-        let to = point - anchor;
-        let r = distance(point, anchor);
-        if r > tolerance {
-            let angle = libm::atan2(first.cross(to), first.dot(to));
-            let half = libm::asin(tolerance / r);
-            *low = low.max(angle - half);
-            *high = high.min(angle + half);
-        }
-    };
-    narrow(run[end], &mut low, &mut high);
-    for next in from + 2..run.len() {
-        let to = run[next] - anchor;
-        let angle = libm::atan2(first.cross(to), first.dot(to));
-        // The chord to `next` must pass through all previous discs.
-        if !(angle >= low && angle <= high) {
-            break;
-        }
-        // Every step must advance along the chord: checking the last one is sufficient, given the
-        // cone.
-        let step = run[next] - run[next - 1];
-        if step.dot(to) <= 0.0 || distance(run[next], anchor) <= distance(run[next - 1], anchor) {
-            break;
-        }
-        end = next;
-        narrow(run[next], &mut low, &mut high);
-        if low > high {
-            break;
-        }
-    }
-    end
 }
 
 #[cfg(test)]

@@ -49,7 +49,7 @@ impl PenLift {
             PenBy::Servo => PenActuator::Servo,
             PenBy::Z => PenActuator::Z,
         });
-        EncodeOptions { pen_actuator, pen_positions: self.pen_positions, legacy_moves: false }
+        EncodeOptions { pen_actuator, pen_positions: self.pen_positions, legacy_moves: false, spare_mm: 0.0 }
     }
 }
 

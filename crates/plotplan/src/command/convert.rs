@@ -7,7 +7,7 @@ mod names;
 use std::collections::BTreeSet;
 
 use backends::pen_plotter::plotter::Plotter;
-use backends::{Backend, Loss, PlanSource, RowIter, WriteError};
+use backends::{Backend, EncodeOptions, Loss, PlanSource, RowIter, WriteError};
 use compiler::import::Page;
 use compiler::layout::Layout;
 use compiler::pipeline::{self, Compiled, Order, Request};
@@ -267,9 +267,11 @@ fn write_encoded(
         Box::new(compiled.trajectory.rows().map(|ExactRow { row, exact }| (row, exact)))
     };
     let source = PlanSource::new(&compiled.header, &rows).on_machine(machine).of_drawing(compiled.ordered());
+    let encode =
+        EncodeOptions { spare_mm: compiled.certificate.spare_mm(), ..arguments.pen.encode_options() };
     let mut refused = None;
     let written = output::write(to, |out| {
-        backend.write(&source, &arguments.pen.encode_options(), out).map_err(|error| match error {
+        backend.write(&source, &encode, out).map_err(|error| match error {
             WriteError::Io(error) => error,
             other => {
                 let kind = std::io::Error::other("not representable");
@@ -283,7 +285,7 @@ fn write_encoded(
         return Err(Failure::Drawing(error));
     }
     written?;
-    let remarks = backend.remarks(&source, &arguments.pen.encode_options());
+    let remarks = backend.remarks(&source, &encode);
     Ok(remarks.into_iter().map(|remark| remark + "\n").collect())
 }
 
