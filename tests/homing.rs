@@ -188,30 +188,62 @@ fn firmware_header_moves_coupled_motors_together() {
     let header = PROGRAM.stdout_of(&dir, "machine show mine.toml --firmware-config dc");
     // A = X + Y, B = X - Y at 92.03 counts/mm: left is both motors backwards, down is A backwards, B forwards.
     // 100 mm/s are 109 us a count; 5 mm are 461 counts; 1.5 times 200 mm are 27,610, rounded up.
-    assert!(header.contains("{true, 0, {-1, -1}, 109, 1087, 461, 27610}"), "{header}");
-    assert!(header.contains("{true, 1, {-1, 1}, 109, 543, 461, 27610}"), "{header}");
+    assert!(header.contains("{true, 0, {-1, -1}, 109, 1087, 461, 27610, 0}"), "{header}");
+    assert!(header.contains("{true, 1, {-1, 1}, 109, 543, 461, 27610, 0}"), "{header}");
     assert!(header.contains("/* .must_home */ true"), "{header}");
     let plain = PROGRAM.stdout_of(&dir, "machine show corexy --firmware-config dc");
     assert!(plain.contains("/* .must_home */ false"), "{plain}");
 }
 
 #[test]
-fn homing_to_a_stop_is_reported_where_the_firmware_cannot() {
+fn mechanical_stops_home_and_fail_with_their_cause() {
     let stop = SWITCHES.replace("\"left\"", "\"stop\"");
     let dir = desk("cartesian", &stop);
     let checked = PROGRAM.run(&dir, "machine check mine.toml");
-    assert!(said(&checked).contains("mechanical stop"), "{}", said(&checked));
-    let device = Emulated::start(&dir, "ticks", "");
-    let refused = send(&dir, "ticks", "--home");
-    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
-    assert!(said(&refused).contains("cannot home to a mechanical stop"), "{}", said(&refused));
-    assert_eq!(device.ink(&dir), 0);
-    PROGRAM.fail(&dir, "machine show mine.toml --firmware-config", 2);
-    // A firmware for G-code may be set up for it.
-    let device = Emulated::start(&dir, "gcode", "");
-    let homed = send(&dir, "gcode", "--home");
-    assert!(homed.status.success(), "{}", said(&homed));
-    assert!(device.ink(&dir) > 0);
+    assert!(!said(&checked).contains("stop"), "{}", said(&checked));
+    for protocol in ["ticks", "gcode"] {
+        let device = Emulated::start(&dir, protocol, "");
+        let refused = send(&dir, protocol, "");
+        assert_eq!(refused.status.code(), Some(2), "{protocol}: {}", said(&refused));
+        let homed = send(&dir, protocol, "--home");
+        assert!(homed.status.success(), "{protocol}: {}", said(&homed));
+        assert!(device.ink(&dir) > 0, "{protocol}");
+    }
+    for (fault, cause) in [
+        ("switch-broken=0", "no stop was felt within the travel"),
+        ("switch-stuck=0", "did not come away from it"),
+    ] {
+        let device = Emulated::start(&dir, "ticks", &format!("--fault {fault}"));
+        let failed = send(&dir, "ticks", "--home");
+        assert_eq!(failed.status.code(), Some(3), "{fault}: {}", said(&failed));
+        assert!(stderr(&failed).contains(cause), "{fault}: {}", said(&failed));
+        assert_eq!(send(&dir, "ticks", "").status.code(), Some(2), "{fault}");
+        assert_eq!(device.ink(&dir), 0, "{fault}");
+    }
+}
+
+#[test]
+fn firmware_header_of_mechanical_stops() {
+    let stop = SWITCHES.replace("\"left\"", "\"stop\"").replace("back_off", "travel = \"200mm\", back_off");
+    let dir = desk("cartesian", &stop);
+    let header =
+        |drive: &str| PROGRAM.stdout_of(&dir, &format!("machine show mine.toml --firmware-config {drive}"));
+    // 80 ticks/mm at 100 mm/s are 125 us a tick; 5 mm are 400 ticks. A stepper makes 205 mm, 16,400 ticks, in any case.
+    let step = header("step");
+    assert!(step.contains("{true, PLOTPLAN_STOP, {-1, 0}, 125, 1250, 400, 16400, 0}"), "{step}");
+    assert!(step.contains("{true, 0, {0, -1}, 125, 625, 400, 24000, 0}"), "{step}");
+    assert!(step.contains("/* .limits_used, .stop_used */ true, false"), "{step}");
+    // 8 % of stiction, 8000 ticks/s of 106.67 for each percent, and 10 %: 93 %, 744 of 800.
+    let dc = header("dc");
+    assert!(dc.contains("{true, PLOTPLAN_STOP, {-1, 0}, 125, 1250, 400, 24000, 744}"), "{dc}");
+    let servo = PROGRAM.fail(&dir, "machine show mine.toml --firmware-config servo", 2);
+    assert!(servo.contains("RC servo"), "{servo}");
+    let both = stop.replace("\"bottom\"", "\"stop\"").replace("back_off = \"5mm\"", "back_off = \"0.5mm\"");
+    let dir = desk("cartesian", &both);
+    let step = PROGRAM.stdout_of(&dir, "machine show mine.toml --firmware-config step");
+    assert!(step.contains("/* .limits_used, .stop_used */ false, false"), "{step}");
+    let short = PROGRAM.fail(&dir, "machine show mine.toml --firmware-config dc", 2);
+    assert!(short.contains("back_off"), "{short}");
 }
 
 #[test]

@@ -8,6 +8,8 @@
  *     --dc G,TAU,S,F    DC motors: ticks/s per percent, s, stiction and friction in percent
  *     --start T1,T2     ticks of the motors at power-up
  *     --switch N,M,POS  switch N (1, 2, or 4 for stop) is closed while motor M is at or below POS
+ *     --stop M,POS,CYCLE motor M (0, 1) cannot turn below POS. A stepper jumps back by CYCLE ticks, four full steps,
+ *                       once its field leads by half of that
  *     --at S,EVENT      S seconds after the first motion: reset, power, hang, unplug1, unplug2,
  *                       close1, close2, close4, open1, open2, open4
  *     --garble-in N, --garble-out N   one byte in N is damaged, to and from the chip; N > 40
@@ -89,11 +91,34 @@ static void drive_pin(char port, int bit, int level) {
     if (*mask & 1 << bit && !(*value & 1 << bit) == !level) {
         return;
     }
+    avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit);
+    /* simavr keeps the value of an irq through a reset of the chip, which clears its pins, and does not pass the
+     * same value on again. */
+    if (!(*mask & 1 << bit)) {
+        avr_raise_irq(pin, !level);
+    }
     *mask |= (uint8_t)(1 << bit);
     *value = (uint8_t)((*value & ~(1 << bit)) | (level ? 1 << bit : 0));
     avr_ioport_external_t external = {.name = (unsigned char)port, .mask = *mask, .value = *value};
     avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL(port), &external);
-    avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit), level ? 1 : 0);
+    avr_raise_irq(pin, level ? 1 : 0);
+}
+
+/* ---- mechanical stops ---- */
+static struct { int used; long position, cycle, slip; } stops[2];
+static double hardest[2]; /* largest duty against the stop, percent */
+
+/* Where a stepper's rotor is, held back by a stop, when its field is at `field`: it stands as long as the field leads
+ * by less than half a cycle, two full steps, and jumps to the stable place behind it then. */
+static long rotor(int m, long field) {
+    if (!stops[m].used) {
+        return field;
+    }
+    while (stops[m].position - (field - stops[m].slip) > stops[m].cycle / 2) {
+        stops[m].slip -= stops[m].cycle;
+    }
+    long free = field - stops[m].slip;
+    return free < stops[m].position ? stops[m].position : free;
 }
 
 /* ---- switches ---- */
@@ -110,7 +135,7 @@ static void set_switches(void) {
 
 /* ---- steppers ---- */
 static uint64_t shortest_pulse = UINT64_MAX, rise[2], fastest = UINT64_MAX, shortest_setup = UINT64_MAX, direction_changed[2];
-static long steps_made;
+static long steps_made, field[2];
 
 static void on_port_d(struct avr_irq_t *irq, uint32_t value, void *param) {
     static uint8_t before;
@@ -129,7 +154,8 @@ static void on_port_d(struct avr_irq_t *irq, uint32_t value, void *param) {
                 shortest_setup = avr->cycle - direction_changed[m];
             }
             rise[m] = avr->cycle;
-            at[m] += value & direction ? -1 : 1;
+            field[m] += value & direction ? -1 : 1;
+            at[m] = rotor(m, field[m]);
             steps_made++;
             moved();
             set_switches();
@@ -236,6 +262,12 @@ static avr_cycle_count_t plant(avr_t *chip, avr_cycle_count_t when, void *param)
     (void)param;
     for (int m = 0; m < 2; m++) {
         plant_step(m);
+        if (stops[m].used && place[m] < (double)stops[m].position) {
+            /* Rigid: the motor stands, whatever its duty. */
+            hardest[m] = fmax(hardest[m], -duty_of(m));
+            place[m] = (double)stops[m].position;
+            speed[m] = fmax(speed[m], 0);
+        }
         long count = (long)floor(place[m] + 0.5);
         while (counts[m] != count) {
             counts[m] += count > counts[m] ? 1 : -1;
@@ -426,13 +458,13 @@ static double wall(void) {
 static void print_summary(double took) {
     printf("{\"cycles\":%llu,\"first_motion\":%llu,\"steps\":%ld,\"at\":[%ld,%ld],\"pen_us\":%d,"
            "\"bytes_in\":%llu,\"bytes_out\":%llu,\"garbled\":%u,\"shortest_pulse\":%llu,\"fastest\":%llu,"
-           "\"shortest_setup\":%llu,\"blocked_longest\":%llu,\"stack\":%d,\"speed\":%.2f,\"duty\":[%.1f,%.1f],\"vectors\":{",
+           "\"shortest_setup\":%llu,\"blocked_longest\":%llu,\"stack\":%d,\"speed\":%.2f,\"duty\":[%.1f,%.1f],\"hardest\":[%.1f,%.1f],\"vectors\":{",
            (unsigned long long)avr->cycle, (unsigned long long)first_motion, steps_made, at[0], at[1], pen_us,
            (unsigned long long)bytes_in, (unsigned long long)bytes_out, garbled,
            (unsigned long long)(shortest_pulse == UINT64_MAX ? 0 : shortest_pulse),
            (unsigned long long)(fastest == UINT64_MAX ? 0 : fastest),
            (unsigned long long)(shortest_setup == UINT64_MAX ? 0 : shortest_setup),
-           (unsigned long long)blocked_longest, 0x8ff - deepest, (double)avr->cycle / CYCLES_PER_S / took, duty_of(0), duty_of(1));
+           (unsigned long long)blocked_longest, 0x8ff - deepest, (double)avr->cycle / CYCLES_PER_S / took, duty_of(0), duty_of(1), hardest[0], hardest[1]);
     int first = 1;
     for (int v = 0; v < VECTORS; v++) {
         if (vectors[v].calls) {
@@ -459,7 +491,7 @@ int main(int argc, char **argv) {
         }
         const char *value = argv[i];
         int n, m;
-        long position;
+        long position, cycle;
         if (!strcmp(option, "--link")) {
             link = value;
         } else if (!strcmp(option, "--trace")) {
@@ -469,10 +501,16 @@ int main(int argc, char **argv) {
         } else if (!strcmp(option, "--start") && sscanf(value, "%ld,%ld", &at[0], &at[1]) == 2) {
             counts[0] = at[0];
             counts[1] = at[1];
+            field[0] = at[0];
+            field[1] = at[1];
         } else if (!strcmp(option, "--switch") && sscanf(value, "%d,%d,%ld", &n, &m, &position) == 3) {
             by_position[n].used = 1;
             by_position[n].motor = m;
             by_position[n].position = position;
+        } else if (!strcmp(option, "--stop") && sscanf(value, "%d,%ld,%ld", &m, &position, &cycle) == 3) {
+            stops[m].used = 1;
+            stops[m].position = position;
+            stops[m].cycle = cycle;
         } else if (!strcmp(option, "--at") && event_count < 16
                    && sscanf(value, "%lf,%15s", &events[event_count].s, events[event_count].what) == 2) {
             event_count++;

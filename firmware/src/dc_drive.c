@@ -14,6 +14,10 @@
 #define START_DELAY_MS 200
 /* The error has been too large for this long when the motors stop. */
 #define FOLLOW_MS 20
+/* A motor at the largest duty of a search has found its stop once its encoder has moved by at most a count for
+ * this long: at twice the duty that moves it, a free one makes a count in a few milliseconds. */
+#define STALL_MS 100
+#define STALL_COUNTS 1
 
 /* Measurement of friction: a slow ramp of duty up to the first counts, then down until they stop.
  * The ramp down is slow against the motor's time constant: 2 %/s lags 0.2 % behind at 0.12 s. */
@@ -36,6 +40,13 @@ static int16_t friction[2];
 static uint8_t window_at, too_far_ms[2], drain_ms, pen_delay, pen_wanted;
 static uint16_t wait_ms;
 static volatile bool engaged;
+
+/* The motors that search a stop, as a mask. */
+static struct {
+    uint8_t motors, still_ms[2];
+    int16_t duty, still_at[2];
+    volatile bool stalled;
+} seeking;
 
 static struct {
     volatile enum { MEASURE_NOT, MEASURE_RISE, MEASURE_FALL, MEASURE_STORE } phase;
@@ -80,6 +91,7 @@ static void init(void) {
     }
     port_load_friction(friction);
     engaged = false;
+    seeking.motors = 0;
 }
 
 static void apply1(int16_t duty) {
@@ -198,7 +210,40 @@ static void advance(void) {
     }
 }
 
+static void seek_stop(uint8_t motors, int16_t duty) {
+    uint8_t state = port_lock();
+    seeking.motors = motors;
+    seeking.duty = duty;
+    seeking.still_ms[0] = seeking.still_ms[1] = 0;
+    seeking.stalled = false;
+    port_unlock(state);
+}
+
+static bool is_stalled(void) {
+    return seeking.stalled;
+}
+
+/* The duty of a motor on its way to a stop. */
+static int16_t sought(uint8_t i, int16_t duty) {
+    if (!(seeking.motors & (1 << i))) {
+        return duty;
+    }
+    int16_t count = (int16_t)at[i], moved = count - seeking.still_at[i];
+    bool limited = duty >= seeking.duty || duty <= -seeking.duty;
+    if (!limited || moved > STALL_COUNTS || moved < -STALL_COUNTS) {
+        seeking.still_at[i] = count;
+        seeking.still_ms[i] = 0;
+    } else if (++seeking.still_ms[i] >= STALL_MS) {
+        seeking.still_ms[i] = STALL_MS;
+        seeking.stalled = true;
+    }
+    return duty > seeking.duty ? seeking.duty : duty < -seeking.duty ? -seeking.duty : duty;
+}
+
 static bool follows(uint8_t i) {
+    if (seeking.motors & (1 << i)) {
+        return true;
+    }
     uint16_t error = (uint16_t)(control[i].error < 0 ? -control[i].error : control[i].error);
     if (error >> SETPOINT_SHIFT < machine->motor[i].loop.follow_counts) {
         too_far_ms[i] = 0;
@@ -295,8 +340,8 @@ static void tick(void) {
         machine_fault(FAULT_FOLLOW);
         return;
     }
-    apply1(duty1);
-    apply2(duty2);
+    apply1(sought(0, duty1));
+    apply2(sought(1, duty2));
 }
 
 static void poll(void) {
@@ -333,6 +378,8 @@ const struct drive dc_drive = {
     .halt = halt,
     .measure = measure,
     .friction = get_friction,
+    .seek_stop = seek_stop,
+    .is_stalled = is_stalled,
     .measures_position = true,
 };
 

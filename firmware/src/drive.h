@@ -31,6 +31,11 @@ struct drive {
     void (*measure)(void);
     /* The friction of both motors that is fed forward, duty in 1/800; NULL if none is. */
     void (*friction)(int16_t duty[2]);
+    /* From now on the motors of this mask turn with at most this duty and may fall behind, as on the way to a
+     * mechanical stop; 0 ends it. NULL if the drive does not feel a stop. */
+    void (*seek_stop)(uint8_t motors, int16_t duty);
+    /* Whether one of them stands still at that duty. */
+    bool (*is_stalled)(void);
     /* Whether `position` is still right after `halt` in motion (encoders: yes, steps: no). */
     bool measures_position;
 };

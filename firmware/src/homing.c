@@ -1,6 +1,7 @@
 #include "homing.h"
 
 #include <stddef.h>
+#include <stdlib.h>
 
 #include "machine.h"
 #include "port.h"
@@ -8,19 +9,31 @@
 
 /* Units of the move in one segment: short enough that a stop does not wait. */
 #define UNITS 8
+/* The way from where a DC motor came to rest to its target, a few counts. */
+#define SETTLE_US 100000UL
 
-enum phase { IDLE, CLEAR, FAST, BACK, SLOW, BACK_AGAIN };
+enum phase { IDLE, CLEAR, FAST, BACK, SLOW, BACK_AGAIN, SETTLE };
 
 static volatile enum phase phase;
 static uint8_t move;
 static uint16_t units_left;
+/* Where the moves made up to now end if the motors are exactly at their targets, in the ticks of the
+ * drive. Contact is what is measured; where the motors come to rest afterwards is not. */
+static int32_t place[2];
+/* The motor that makes most of the move, and its position at the first contact. */
+static uint8_t leader;
+static int32_t first_contact;
 
 static const struct plotplan_homing *current(void) {
     return &machine->homing[move];
 }
 
+static bool goes_to_stop(void) {
+    return current()->limit_switch == PLOTPLAN_STOP;
+}
+
 static bool switch_is_closed(void) {
-    return port_switches() & (current()->limit_switch ? SWITCH_2 : SWITCH_1);
+    return !goes_to_stop() && port_switches() & (current()->limit_switch ? SWITCH_2 : SWITCH_1);
 }
 
 static void enter(enum phase next, uint16_t units) {
@@ -28,9 +41,19 @@ static void enter(enum phase next, uint16_t units) {
     units_left = units;
 }
 
+/* Limits the force on the way to a stop and back. */
+static void limit_duty(void) {
+    if (machine->drive->seek_stop) {
+        uint8_t motors = (current()->ticks[0] ? 1 : 0) | (current()->ticks[1] ? 2 : 0);
+        machine->drive->seek_stop(goes_to_stop() ? motors : 0, current()->stop_duty);
+    }
+}
+
 /* A switch that is closed at the start is left first. */
 static void start_move(void) {
     const struct plotplan_homing *homing = current();
+    leader = abs(homing->ticks[1]) > abs(homing->ticks[0]) ? 1 : 0;
+    limit_duty();
     if (switch_is_closed()) {
         enter(CLEAR, homing->longest);
     } else {
@@ -38,14 +61,25 @@ static void start_move(void) {
     }
 }
 
+/* A drive that knows its position without a search, such as RC servos, has nothing to find at a stop. */
+static bool can_home(void) {
+    for (uint8_t i = 0; i < 2; i++) {
+        const struct plotplan_homing *homing = &machine->homing[i];
+        if (homing->used && homing->limit_switch == PLOTPLAN_STOP && machine->drive->measures_position
+            && !machine->drive->seek_stop) {
+            return false;
+        }
+    }
+    return machine->homing[0].used;
+}
+
 bool homing_start(void) {
-    move = 0;
-    if (!machine->homing[0].used) {
+    if (!can_home()) {
         return false;
     }
-    int32_t at[2];
-    machine->drive->position(at);
-    machine_set_position(at[0], at[1]);
+    move = 0;
+    machine->drive->position(place);
+    machine_set_position(place[0], place[1]);
     start_move();
     return true;
 }
@@ -55,12 +89,30 @@ bool homing_is_active(void) {
 }
 
 void homing_cancel(void) {
+    if (phase != IDLE && machine->drive->seek_stop) {
+        machine->drive->seek_stop(0, 0);
+    }
     phase = IDLE;
 }
 
 static void fail(void) {
-    phase = IDLE;
+    homing_cancel();
     machine_fault(FAULT_HOME);
+}
+
+static bool is_at_rest(void) {
+    return queue_is_empty() && !machine->drive->is_moving();
+}
+
+/* Of the end of a move: `place` after the leader has touched the switch or stop at `contact` and the motors
+ * have backed off. The other motor keeps the ratio of the move. */
+static void advance_place(int32_t contact) {
+    const struct plotplan_homing *homing = current();
+    int32_t ticks = homing->ticks[leader];
+    int32_t way = contact - place[leader] - ticks * homing->back_off;
+    uint8_t other = !leader;
+    place[leader] += way;
+    place[other] += way * homing->ticks[other] / ticks;
 }
 
 static void next_move(void) {
@@ -69,8 +121,24 @@ static void next_move(void) {
         start_move();
         return;
     }
-    phase = IDLE;
-    machine_set_position(machine->home[0], machine->home[1]);
+    move--;
+    int32_t at[2];
+    machine->drive->position(at);
+    for (uint8_t i = 0; i < 2; i++) {
+        at[i] += machine->home[i] - place[i];
+    }
+    if (machine->drive->seek_stop) {
+        machine->drive->seek_stop(0, 0);
+    }
+    machine_set_position(at[0], at[1]);
+    int16_t rest[2];
+    for (uint8_t i = 0; i < 2; i++) {
+        rest[i] = (int16_t)(machine->home[i] - at[i]);
+    }
+    if (rest[0] || rest[1]) {
+        machine_push(rest[0], rest[1], SETTLE_US);
+    }
+    enter(SETTLE, 0);
 }
 
 /* Keeps two segments in the queue. */
@@ -85,22 +153,43 @@ static void push_units(int8_t sign, uint16_t unit_us) {
     units_left -= units;
 }
 
-static bool is_at_rest(void) {
-    return queue_is_empty() && !machine->drive->is_moving();
-}
-
-static void stop_and_enter(enum phase next, uint16_t units) {
+/* Stops where the motors are; that of the leader. */
+static int32_t stop_and_enter(enum phase next, uint16_t units) {
     machine_stop_here();
     int32_t at[2];
     machine->drive->position(at);
     machine_set_position(at[0], at[1]);
+    limit_duty();
     enter(next, units);
+    return at[leader];
 }
 
-static void search(uint16_t unit_us, enum phase next) {
-    if (switch_is_closed()) {
-        stop_and_enter(next, current()->back_off);
-    } else if (units_left == 0 && is_at_rest()) {
+/* A drive that does not feel a stop is at it once it has made all steps. */
+static bool is_at_contact(bool has_ended) {
+    if (!goes_to_stop()) {
+        return switch_is_closed();
+    }
+    return machine->drive->is_stalled ? machine->drive->is_stalled() : has_ended;
+}
+
+static void search(uint16_t unit_us) {
+    const struct plotplan_homing *homing = current();
+    bool has_ended = units_left == 0 && is_at_rest();
+    if (is_at_contact(has_ended)) {
+        if (phase == FAST) {
+            first_contact = stop_and_enter(BACK, homing->back_off);
+            return;
+        }
+        int32_t contact = stop_and_enter(BACK_AGAIN, homing->back_off);
+        /* What held the motor back the first time was not the stop, or it has not moved since. */
+        int32_t off = labs(contact - first_contact);
+        if (goes_to_stop() && machine->drive->is_stalled
+            && off > (int32_t)homing->back_off * abs(homing->ticks[leader]) / 2) {
+            fail();
+        } else {
+            advance_place(contact);
+        }
+    } else if (has_ended) {
         fail();
     } else if (queue_is_empty()) {
         push_units(1, unit_us);
@@ -119,6 +208,24 @@ static void clear(void) {
     }
 }
 
+static void back_off(uint16_t unit_us) {
+    if (goes_to_stop() && machine->drive->is_stalled && machine->drive->is_stalled()) {
+        fail(); /* blocked, or the encoder does not count */
+    } else if (units_left > 0) {
+        if (queue_is_empty()) {
+            push_units(-1, unit_us);
+        }
+    } else if (is_at_rest()) {
+        if (switch_is_closed() || !machine_has_arrived()) {
+            fail();
+        } else if (phase == BACK) {
+            enter(SLOW, 2 * current()->back_off);
+        } else {
+            next_move();
+        }
+    }
+}
+
 void homing_poll(void) {
     const struct plotplan_homing *homing = current();
     switch (phase) {
@@ -128,26 +235,21 @@ void homing_poll(void) {
         clear();
         return;
     case BACK:
+        back_off(homing->fast_us);
+        return;
     case BACK_AGAIN:
-        if (units_left > 0) {
-            if (queue_is_empty()) {
-                push_units(-1, phase == BACK_AGAIN ? homing->slow_us : homing->fast_us);
-            }
-        } else if (is_at_rest()) {
-            if (switch_is_closed()) {
-                fail();
-            } else if (phase == BACK) {
-                enter(SLOW, 2 * homing->back_off);
-            } else {
-                next_move();
-            }
-        }
+        back_off(homing->slow_us);
         return;
     case FAST:
-        search(homing->fast_us, BACK);
+        search(homing->fast_us);
         return;
     case SLOW:
-        search(homing->slow_us, BACK_AGAIN);
+        search(homing->slow_us);
+        return;
+    case SETTLE:
+        if (is_at_rest()) {
+            phase = IDLE;
+        }
         return;
     }
 }

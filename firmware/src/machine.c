@@ -135,9 +135,7 @@ reason machine_sync(uint32_t row, uint32_t time_us, int32_t ticks1, int32_t tick
         /* A plan that starts where `where` said the motors were, a count ago. */
         planned[0] = ticks1;
         planned[1] = ticks2;
-        int32_t at[2];
-        machine->drive->position(at);
-        if (labs(at[0] - ticks1) > ARRIVED_TICKS || labs(at[1] - ticks2) > ARRIVED_TICKS) {
+        if (!machine_has_arrived()) {
             return TEXT("place");
         }
     }
@@ -234,6 +232,12 @@ reason machine_measure(void) {
     return NULL;
 }
 
+bool machine_has_arrived(void) {
+    int32_t at[2];
+    machine->drive->position(at);
+    return labs(at[0] - planned[0]) <= ARRIVED_TICKS && labs(at[1] - planned[1]) <= ARRIVED_TICKS;
+}
+
 bool machine_where(int32_t ticks[2], bool *moving) {
     if (!known || homing_is_active()) {
         return false;
@@ -242,8 +246,7 @@ bool machine_where(int32_t ticks[2], bool *moving) {
     machine->drive->position(ticks);
     /* A DC motor rests within a few counts of its target. The loop still pulls it there, so the
      * target is the position to plan from. */
-    if (!*moving && fault == FAULT_NONE && labs(ticks[0] - planned[0]) <= ARRIVED_TICKS
-        && labs(ticks[1] - planned[1]) <= ARRIVED_TICKS) {
+    if (!*moving && fault == FAULT_NONE && machine_has_arrived()) {
         ticks[0] = planned[0];
         ticks[1] = planned[1];
     }
@@ -265,7 +268,8 @@ uint8_t machine_late(void) {
 }
 
 void machine_count_late(void) {
-    if (late < UINT8_MAX) {
+    /* Homing's moves end in motion on purpose. */
+    if (late < UINT8_MAX && !homing_is_active()) {
         late++;
     }
 }

@@ -49,6 +49,8 @@ void machine_push(int16_t ticks1, int16_t ticks2, uint32_t us);
 /* Halts the drive and empties the queue; what was planned is where the motors are. */
 void machine_stop_here(void);
 void machine_set_position(int32_t ticks1, int32_t ticks2);
+/* Whether both motors at rest are within a few ticks of where they should be. */
+bool machine_has_arrived(void);
 
 /* Milliseconds since the start, modulo 2^16. */
 uint16_t machine_ms(void);

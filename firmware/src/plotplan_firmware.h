@@ -10,7 +10,7 @@ extern "C" {
 #include "drive.h"
 
 /* Layout of `struct plotplan_machine`; a header written for another layout does not compile. */
-#define PLOTPLAN_CONFIG_VERSION 1
+#define PLOTPLAN_CONFIG_VERSION 2
 /* Version of tick lines that the firmware executes. */
 #define PLOTPLAN_TICK_LINES_VERSION 1
 
@@ -46,15 +46,20 @@ struct plotplan_pen {
     int16_t up, down;
 };
 
-/* One homing move: both motors move in this ratio until the switch closes, back off, approach again
- * slowly and back off. */
+/* In place of a switch: a mechanical stop. A DC motor finds it when its encoder stands still at `stop_duty`; a
+ * stepper makes `longest` units towards it and loses those that the stop holds back. */
+#define PLOTPLAN_STOP 255
+
+/* One homing move: both motors move in this ratio until the switch closes or the stop is reached, back off,
+ * approach again slowly and back off. */
 struct plotplan_homing {
     bool used;
-    uint8_t limit_switch;             /* 0 or 1 */
+    uint8_t limit_switch;             /* 0, 1, or PLOTPLAN_STOP */
     int8_t ticks[2];                  /* direction: ticks of each motor per unit of the move */
     uint16_t fast_us, slow_us;        /* time of one unit */
     uint16_t back_off;                /* units */
     uint16_t longest;                 /* units after which the search fails */
+    int16_t stop_duty;                /* largest duty of a DC motor on its way to a stop, 1/800 */
 };
 
 struct plotplan_machine {

@@ -57,13 +57,8 @@ static void init(void) {
     STEP_START();
 }
 
-/* Loads the next piece, which begins at `now`; false if there is none. */
-static inline bool load_piece(uint16_t now) {
-    if (tail == head) {
-        running = false;
-        ran_dry = piece_moves;
-        return false;
-    }
+/* Loads the next piece, which begins at `now`; there is one. */
+static inline void load_piece(uint16_t now) {
     const struct piece *piece = &pieces[tail];
     step_clock_load(&clock1, &piece->motor[0], now);
     step_clock_load(&clock2, &piece->motor[1], now);
@@ -83,7 +78,6 @@ static inline bool load_piece(uint16_t now) {
         PIN_LOW(PIN_DIR2);
     }
     tail = (tail + 1) & (PIECES - 1);
-    return true;
 }
 
 static inline uint16_t time_to_next_event(uint16_t now) {
@@ -111,9 +105,17 @@ STEP_INTERRUPT {
         if (due2) {
             step_clock_advance(&clock2);
         }
-        if (now == piece_end && !load_piece(now)) {
-            STEP_DISABLE();
-            break;
+        if (!clock1.left && !clock2.left) {
+            if (tail != head) {
+                /* Not at the piece's end, where the first steps of the next one may be due: after the last step,
+                 * which is half an interval before the end of its line. */
+                load_piece(piece_end);
+            } else if (now == piece_end) {
+                running = false;
+                ran_dry = piece_moves;
+                STEP_DISABLE();
+                break;
+            }
         }
         uint16_t wait = time_to_next_event(now);
         uint16_t next = now + wait;
@@ -196,7 +198,8 @@ static void start(void) {
     uint8_t state = port_lock();
     if (head != tail) {
         event = STEP_COUNT() + START_LEAD;
-        running = load_piece(event);
+        load_piece(event);
+        running = true;
         event += time_to_next_event(event);
         STEP_MATCH(event);
         STEP_CLEAR();

@@ -58,6 +58,21 @@ static bool has_segment;
 /* A switch closes while motor 0 is at or below this; `physical` is not changed by a new datum. */
 static int32_t switch_at, physical;
 static bool switch_fitted;
+/* A mechanical stop, which motor 0 does not pass, and a place above it where it sticks once. A drive that feels it
+ * does not move on and is stalled after 10 ticks more; another one counts steps that are not made. */
+static int32_t stop_at, sticks_at;
+static bool stop_fitted, jammed, seeks;
+static uint8_t held_back, sought_motors;
+static void drive_seek(uint8_t motors, int16_t duty) { (void)duty; sought_motors = motors; held_back = 0; }
+static bool drive_stalled(void) { return sought_motors && held_back >= 10; }
+/* Whether motor 0 cannot make this tick. */
+static bool is_held(int d) {
+    bool held = (stop_fitted && d < 0 && (physical <= stop_at || physical == sticks_at)) || (jammed && d != 0);
+    if (d != 0) {
+        held_back = !held ? 0 : held_back < 255 ? held_back + 1 : 255;
+    }
+    return held;
+}
 
 static void drive_init(void) { has_segment = halted = false; }
 static void drive_set(int32_t a, int32_t b) { drive_at[0] = a; drive_at[1] = b; halted = false; }
@@ -81,8 +96,9 @@ static void drive_poll(void) {
         for (int i = 0; i < 2; i++) {
             int d = (executing.ticks[i] > 0) - (executing.ticks[i] < 0);
             executing.ticks[i] -= d;
-            drive_at[i] += d;
-            physical += i == 0 ? d : 0;
+            bool held = i == 0 && is_held(d);
+            drive_at[i] += held && seeks ? 0 : d;
+            physical += i == 0 && !held ? d : 0;
         }
         has_segment = executing.ticks[0] || executing.ticks[1];
     }
@@ -98,6 +114,8 @@ static struct plotplan_machine config;
 static void fresh(void) {
     memset(&config, 0, sizeof config);
     fake_drive.measures_position = measures;
+    fake_drive.seek_stop = seeks ? drive_seek : NULL;
+    fake_drive.is_stalled = seeks ? drive_stalled : NULL;
     config.name = "coaxial";
     config.drive = &fake_drive;
     for (int i = 0; i < 2; i++) {
@@ -110,7 +128,9 @@ static void fresh(void) {
     config.pen.down = 1500;
     config.limits_used = config.stop_used = true;
     closed_switches = 0;
-    switch_fitted = hold = false;
+    switch_fitted = hold = stop_fitted = jammed = false;
+    sticks_at = INT32_MIN;
+    sought_motors = held_back = 0;
     drive_at[0] = drive_at[1] = 0;
     homing_cancel();
     machine_init(&config);
@@ -596,6 +616,75 @@ static void homing_fails_without_a_switch(void) {
     CHECK(answers("where", "at unknown"));
 }
 
+static void run_homing(void) {
+    for (long i = 0; i < 200000 && homing_is_active(); i++) {
+        machine_poll();
+    }
+    machine_poll();
+    CHECK(!homing_is_active() && sought_motors == 0);
+}
+
+static void prepare_stop(bool feels, int32_t at, int32_t from) {
+    measures = seeks = feels;
+    fresh();
+    config.must_home = true;
+    config.homing[0] = (struct plotplan_homing){.used = true, .limit_switch = PLOTPLAN_STOP, .ticks = {-1, 1},
+        .fast_us = 500, .slow_us = 4000, .back_off = 40, .longest = 3000, .stop_duty = 160};
+    config.home[0] = 7;
+    config.home[1] = -7;
+    stop_fitted = true;
+    stop_at = at;
+    physical = from;
+}
+
+static void homing_finds_a_mechanical_stop_from_ten_poses(void) {
+    for (int feels = 0; feels < 2; feels++) {
+        for (int pose = 0; pose < 10; pose++) {
+            prepare_stop(feels, -500, -500 + 120 * pose); /* pose 0 stands at the stop */
+            closed_switches = SWITCH_1 | SWITCH_2; /* the pins of switches do not matter */
+            CHECK(answers("0:begin 1 1 10000", "error 0 home"));
+            CHECK(strcmp(framed("home"), "ok") == 0);
+            run_homing();
+            CHECK(physical == -460);
+            CHECK(answers("where", "at 7 -7 0"));
+            CHECK(drive_at[0] == 7 && drive_at[1] == -7);
+            closed_switches = 0;
+            CHECK(answers("0:begin 1 1 10000", "ok 1 room 127"));
+        }
+    }
+    measures = seeks = false;
+}
+
+static void homing_to_a_stop_fails(void) {
+    for (int way = 0; way < 4; way++) {
+        prepare_stop(true, way == 0 ? -5000 : -500, 0);
+        jammed = way == 1;    /* or an encoder without counts */
+        sticks_at = way == 2 ? -100 : INT32_MIN; /* held back once, 400 ticks before the stop */
+        CHECK(strcmp(framed("home"), "ok") == 0);
+        for (int i = 0; i < 4000 && way == 2; i++) {
+            machine_poll();
+            if (held_back >= 10) {
+                sticks_at = INT32_MIN;
+            }
+        }
+        if (way == 3) {
+            for (int i = 0; i < 100; i++) {
+                machine_poll();
+            }
+            CHECK(sought_motors == 3 && strcmp(framed("stop"), "ok") == 0);
+        }
+        run_homing();
+        CHECK(answers("status", way == 3 ? "status stop late 0 start power" : "status home late 0 start power"));
+        CHECK(answers("where", "at unknown"));
+        CHECK(answers("0:begin 1 1 10000", "error 0 home"));
+    }
+    /* An RC servo has nothing to find there. */
+    prepare_stop(false, -500, 0);
+    fake_drive.measures_position = true;
+    CHECK(strcmp(framed("home"), "error no switches") == 0);
+    measures = seeks = false;
+}
+
 static void pens_of_all_kinds(void) {
     fresh();
     config.pen.kind = PEN_SOLENOID;
@@ -637,6 +726,8 @@ int main(void) {
     stop_command_and_follow_fault();
     homing_finds_the_switch_from_ten_poses();
     homing_fails_without_a_switch();
+    homing_finds_a_mechanical_stop_from_ten_poses();
+    homing_to_a_stop_fails();
     pens_of_all_kinds();
     printf("%d checks passed, %d failed\n", passed, failed);
     return failed != 0;

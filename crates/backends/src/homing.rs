@@ -107,12 +107,13 @@ impl HomingRun {
     }
 }
 
-/// A switch of an emulated machine that does not work.
+/// A switch or mechanical stop of an emulated machine that does not work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SwitchFault {
-    /// The switch of this homing move, from 0, never closes: a wire is broken, or it turns the wrong way.
+    /// The switch of this homing move, from 0, never closes: a wire is broken, or it turns the wrong way. A stop is
+    /// not reached within the travel.
     Broken(u8),
-    /// It never opens.
+    /// It never opens. The motor does not come away from a stop: it is jammed, or its encoder does not count.
     Stuck(u8),
 }
 
@@ -123,8 +124,6 @@ pub struct EmulatedHoming {
     pub moves_us: [Option<[u64; 2]>; 2],
     /// A switch that does not work.
     pub fault: Option<SwitchFault>,
-    /// Whether a move goes to a mechanical stop, which firmwares that home by switches cannot find.
-    pub needs_stop: bool,
 }
 
 /// An emulated machine stands at this share of the way from its switch when it is switched on.
@@ -140,7 +139,7 @@ impl EmulatedHoming {
             let slow_s = 2.0 * mv.back_off / mv.slow_speed;
             *times = Some([us(fast_s + slow_s), us(mv.timeout_s)]);
         }
-        Self { moves_us, fault, needs_stop: homing.needs_stop() }
+        Self { moves_us, fault }
     }
 }
 

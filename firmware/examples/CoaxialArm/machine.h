@@ -2,7 +2,7 @@
    Wiring and the values to adjust: docs/firmware.md */
 #include "plotplan_firmware.h"
 
-#if PLOTPLAN_CONFIG_VERSION != 1
+#if PLOTPLAN_CONFIG_VERSION != 2
 #error "this header was written for another version of the firmware"
 #endif
 
@@ -22,7 +22,7 @@ static const struct plotplan_machine plotplan_machine = {
         },
     },
     /* .pen: kind, up, down (us) */ {PEN_SERVO, 1000, 1500},
-    /* .homing */ {{false, 0, {0, 0}, 0, 0, 0, 0}, {false, 0, {0, 0}, 0, 0, 0, 0}},
+    /* .homing */ {{false, 0, {0, 0}, 0, 0, 0, 0, 0}, {false, 0, {0, 0}, 0, 0, 0, 0, 0}},
     /* .home */ {0, 0}, /* .must_home */ false,
     /* .limits_used, .stop_used */ false, false,
 };

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use kinematics::Machine;
 use simulation::plant::DcParameters;
 use simulation::{
@@ -38,14 +38,20 @@ pub(super) fn run(bench: &mut Bench) {
     bench.check("DC motors draw zot as predicted", drawn_as_predicted);
     bench.check("friction measured at set-up", friction_measured);
     bench.check("encoder unplugged", unplugged);
+    bench.check("DC motors homed against stops from six poses", homed_against_stops);
+    bench.check("homing without a stop, or without an encoder, fails", stop_not_found);
 }
 
 fn rig(bench: &Bench, motor: [f64; 4], start: [i64; 2], more: &[&str]) -> Result<Rig> {
+    rig_of(bench, IMAGE, motor, start, more)
+}
+
+fn rig_of(bench: &Bench, image: &str, motor: [f64; 4], start: [i64; 2], more: &[&str]) -> Result<Rig> {
     let motor = motor.map(|value| value.to_string()).join(",");
     let start = format!("{},{}", start[0], start[1]);
     let mut options = vec!["--dc", &motor, "--start", &start];
     options.extend(more);
-    Rig::start(bench, IMAGE, &options)
+    Rig::start(bench, image, &options)
 }
 
 /// A plan with what it was made from.
@@ -167,4 +173,110 @@ fn unplugged(bench: &Bench) -> Result<String> {
     let stopped = (pen.0 - first) * 1e-6 - 3.0;
     ensure!(stopped < FOLLOW_S, "stopped after {stopped:.2} s");
     Ok(format!("`error follow` {:.0} ms later, motors off, pen up", 1e3 * stopped))
+}
+
+/// `app/stops.h`: motor 1, then motor 2, towards smaller ticks; the datum is 40 ticks from each stop.
+const STOPS_IMAGE: &str = "uno-stops";
+const STOPS: [i64; 2] = [-40, 20];
+const BACK_OFF: i64 = 40;
+const DATUM: [i64; 2] = [800, 800];
+
+/// From poses at a stop, near it and far away, with soft and stiff motors; then zot is drawn by the datum.
+fn homed_against_stops(bench: &Bench) -> Result<String> {
+    let [g, tau, stiction, friction] = MOTOR;
+    let stiff = [g, tau, 1.5 * stiction, 1.5 * friction];
+    let (mut worst, mut force, mut longest) = (0, 0.0_f64, 0.0_f64);
+    for pose in 0..6_i64 {
+        let motor = if pose % 2 == 0 { MOTOR } else { stiff };
+        let start = [STOPS[0] + pose * 137, STOPS[1] + (5 - pose) * 111];
+        let stops = [0, 1].map(|motor: usize| format!("{motor},{},0", STOPS[motor]));
+        let rig = rig_of(bench, STOPS_IMAGE, motor, start, &["--stop", &stops[0], "--stop", &stops[1]])?;
+        let answer = rig.ask("0:begin 1 1 1000")?;
+        ensure!(answer == "error 0 home", "a plan before homing: {answer}");
+        let answer = rig.ask("home")?;
+        ensure!(answer == "ok", "home: {answer}");
+        let place = rig.ask_until("where", |answer| answer != "at unknown")?;
+        ensure!(place == format!("at {} {} 0", DATUM[0], DATUM[1]), "{place}");
+        let (summary, trace) = rig.finish()?;
+        let end = summary.pair("at");
+        let off = [0, 1].map(|m: usize| (end[m] as i64 - STOPS[m] - BACK_OFF).abs());
+        worst = worst.max(off[0]).max(off[1]);
+        // At rest stiction holds a motor against this many counts of error.
+        let held = (motor[2] / GAINS[0]).ceil() as i64;
+        ensure!(off[0].max(off[1]) <= held, "from {start:?} the motors end at {end:?}");
+        force = summary.pair("hardest").into_iter().fold(force, f64::max);
+        let moves = trace.positions.iter().zip(trace.positions.iter().skip(1)).filter(|(a, b)| a.1 != b.1);
+        let times: Vec<f64> = moves.map(|(_, b)| b.0).collect();
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { bail!("no motion") };
+        longest = longest.max((last - first) * 1e-6);
+    }
+    ensure!(force <= STOP_DUTY_PERCENT + 0.5, "{force:.1} % against the stop");
+    let drawn = draw_after_stops(bench)?;
+    Ok(format!(
+        "each at rest within {worst} counts of the same place, at most {force:.1} % against a stop, {longest:.1} s; {drawn}"
+    ))
+}
+
+/// Where a plan ends after homing: the datum is that of the contact, whatever the motors' place at rest is.
+const ARRIVED_TICKS: i64 = 2;
+/// `stop_duty` of `app/stops.h`.
+const STOP_DUTY_PERCENT: f64 = 20.0;
+
+/// The loop closed, the datum from the stops: every place of zot is drawn where the counts say.
+fn draw_after_stops(bench: &Bench) -> Result<String> {
+    let plan = bench.plan(&bench.example("zot.hpgl"), &[])?;
+    let steps = Steps::read(&plan)?;
+    // The plan is moved to where homing ends.
+    let text = std::fs::read_to_string(&plan)?;
+    let moved = shifted(&text, [DATUM[0] - steps.start[0], DATUM[1] - steps.start[1]]);
+    let shifted_plan = bench.file("zot-at-datum.ticks");
+    std::fs::write(&shifted_plan, moved)?;
+    let stops = [0, 1].map(|motor: usize| format!("{motor},{},0", STOPS[motor] - 2000));
+    let start = [STOPS[0] - 1700, STOPS[1] - 1900];
+    let rig = rig_of(bench, STOPS_IMAGE, MOTOR, start, &["--stop", &stops[0], "--stop", &stops[1]])?;
+    ensure!(rig.ask("home")? == "ok", "home");
+    rig.ask_until("where", |answer| answer != "at unknown")?;
+    rig.draw(bench, &shifted_plan)?;
+    rig.ask_until("where", |answer| answer.ends_with(" 0"))?;
+    let (summary, trace) = rig.finish()?;
+    let end = summary.pair("at");
+    let wanted = [0, 1].map(|m: usize| STOPS[m] - 2000 + BACK_OFF + steps.end[m] - steps.start[m]);
+    let off = [0, 1].map(|m: usize| (end[m] as i64 - wanted[m]).abs());
+    ensure!(off[0].max(off[1]) <= ARRIVED_TICKS, "zot ends at {end:?} instead of {wanted:?}");
+    ensure!(trace.pen_changes(PEN_DOWN_US) == steps.pens, "the pen: {:?}", trace.pens);
+    Ok(format!("zot drawn from there ends within {} counts", off[0].max(off[1])))
+}
+
+/// A plan of tick lines with all positions moved.
+fn shifted(text: &str, by: [i64; 2]) -> String {
+    let line = |line: &str| {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words[..] {
+            [verb @ ("s" | "m"), first, second, a, b] => {
+                let at = |text: &str, by: i64| text.parse::<i64>().map_or(0, |ticks| ticks + by);
+                format!("{verb} {first} {second} {} {}\n", at(a, by[0]), at(b, by[1]))
+            }
+            _ => format!("{line}\n"),
+        }
+    };
+    text.lines().map(line).collect()
+}
+
+/// The way without a stop ends in state `home`; so does a motor whose encoder does not count.
+fn stop_not_found(bench: &Bench) -> Result<String> {
+    let at_stop = format!("0,{},0", STOPS[0]);
+    let mut remarks = Vec::new();
+    for (what, options) in
+        [("no stop", vec![]), ("encoder unplugged", vec!["--stop", at_stop.as_str(), "--at", "0.3,unplug1"])]
+    {
+        let rig = rig_of(bench, STOPS_IMAGE, MOTOR, [300, 300], &options)?;
+        ensure!(rig.ask("home")? == "ok", "home");
+        let status = rig.ask_until("status", |answer| !answer.contains("homing"))?;
+        ensure!(status.contains("status home "), "{what}: {status}");
+        ensure!(rig.ask("where")? == "at unknown", "{what}: the position is known");
+        let (summary, _) = rig.finish()?;
+        ensure!(summary.pair("duty") == [0.0; 2], "{what}: duty {:?}", summary.pair("duty"));
+        remarks.push(format!("{what}: `{status}` at {} ticks", summary.pair("at")[0]));
+    }
+    Ok(remarks.join("; "))
 }

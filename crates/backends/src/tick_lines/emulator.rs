@@ -138,8 +138,9 @@ impl TickLineReader {
         true
     }
 
-    fn has_switches(&self) -> bool {
-        self.homing.is_some_and(|homing| homing.moves_us[0].is_some() && !homing.needs_stop)
+    /// Whether it homes by switches or stops.
+    fn homes_by_moves(&self) -> bool {
+        self.homing.is_some_and(|homing| homing.moves_us[0].is_some())
     }
 
     /// The answer to `home`.
@@ -151,7 +152,7 @@ impl TickLineReader {
             return "error moving";
         }
         let now_us = self.now_us;
-        if !self.has_switches() || !self.datum.begin(self.homing, now_us) {
+        if !self.homes_by_moves() || !self.datum.begin(self.homing, now_us) {
             return "error no switches";
         }
         (self.position, self.planned, self.next) = (None, None, 0);
@@ -237,8 +238,8 @@ impl TickLineReader {
             (Datum::Limit, "begin") if self.queue.is_empty() => return Err("home"),
             (Datum::Limit, _) => return Err("limit"),
             (Datum::Homing { .. }, _) => return Err("homing"),
-            // A reader without switches takes the place of the first sync line for its own.
-            (Datum::Unknown | Datum::Failed(_), _) if self.has_switches() => return Err("home"),
+            // A reader without homing moves takes the place of the first sync line for its own.
+            (Datum::Unknown | Datum::Failed(_), _) if self.homes_by_moves() => return Err("home"),
             _ => {}
         }
         match (verb, &numbers[..]) {

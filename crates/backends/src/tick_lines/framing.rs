@@ -109,15 +109,16 @@ impl StatusProtocol for TickLineStatus {
     }
 }
 
-/// Homing by `home`, then `where` and `status` until the position is known.
-pub(crate) fn homing() -> HomingSteps {
+/// Homing by `home`, then `where` and `status` until the position is known. `needs_stop`: a move goes to a
+/// mechanical stop.
+pub(crate) fn homing(needs_stop: bool) -> HomingSteps {
     HomingSteps {
         steps: vec![
             HomingStep { text: framed("home") + "\n", repeats: true, parse: begun },
             HomingStep {
                 text: framed("where") + "\n" + &framed("status") + "\n",
                 repeats: true,
-                parse: found,
+                parse: if needs_stop { found_stop } else { found_switch },
             },
         ],
         abort: b"stop*115\n",
@@ -130,7 +131,9 @@ fn begun(line: &str) -> StepAnswer {
         // The answer to the first `home` was lost.
         "ok" | "error homing" => StepAnswer::Done,
         text => match text.strip_prefix("error ").filter(|why| *why != "moving") {
-            Some("no switches") => StepAnswer::Failed("the firmware has no switches to home by".to_owned()),
+            Some("no switches") => {
+                StepAnswer::Failed("the firmware has no switches or stops to home by".to_owned())
+            }
             Some(why) => StepAnswer::Failed(format!("the machine does not home: {why}")),
             // A machine that moves is asked again.
             None => StepAnswer::Other,
@@ -138,16 +141,21 @@ fn begun(line: &str) -> StepAnswer {
     }
 }
 
-/// Whether homing has ended.
-fn found(line: &str) -> StepAnswer {
+fn found_switch(line: &str) -> StepAnswer {
+    found(line, "a switch did not close on the way to it, or did not open on the way back")
+}
+
+fn found_stop(line: &str) -> StepAnswer {
+    found(line, "no stop was felt within the travel, or the motor did not come away from it")
+}
+
+/// Whether homing has ended; `failure` is what state `home` means.
+fn found(line: &str, failure: &str) -> StepAnswer {
     let Some(text) = unframed(line) else { return StepAnswer::Other };
     let words: Vec<&str> = text.split(' ').collect();
     match words[..] {
         ["at", _, _, "0"] => StepAnswer::Done,
-        ["status", "home", ..] => StepAnswer::Failed(
-            "homing has failed: a switch did not close on the way to it, or did not open on the way back"
-                .to_owned(),
-        ),
+        ["status", "home", ..] => StepAnswer::Failed(format!("homing has failed: {failure}")),
         ["status", fault @ ("limit" | "stop" | "follow"), ..] => {
             StepAnswer::Failed(format!("homing was stopped: {fault}"))
         }

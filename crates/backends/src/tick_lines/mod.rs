@@ -111,7 +111,7 @@ impl Backend for Answered {
 
     fn homing(&self, machine: &Machine) -> Option<HomingSteps> {
         let homing = machine.parts().homing.as_ref()?;
-        (!homing.moves().is_empty() && !homing.needs_stop()).then(framing::homing)
+        (!homing.moves().is_empty()).then(|| framing::homing(homing.needs_stop()))
     }
 
     fn knows_datum(&self) -> bool {

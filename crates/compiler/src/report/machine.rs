@@ -205,13 +205,6 @@ fn doubts(machine: &Machine) -> Vec<String> {
             doubts.push(format!("motor {name} takes {speed:.0} ticks/s, more than a controller gives"));
         }
     }
-    if machine.parts().homing.as_ref().is_some_and(kinematics::Homing::needs_stop) {
-        doubts.push(
-            "[homing] goes to a mechanical stop: the firmware for tick lines homes by switches only, firmwares for \
-             G-code must be set up for it (sensorless homing)"
-                .to_owned(),
-        );
-    }
     let middle = machine.sheet().center();
     if let Ok(pose) = machine.pose_near(middle, &machine.start()) {
         let fastest = (0..36)

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use anyhow::anyhow;
 use drawing::Point;
-use kinematics::Machine;
+use kinematics::{HomingMove, Machine};
 use simulation::{Drive, Feedback, MotorPlant};
 
 use crate::cli::FirmwareDrive;
@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::machines::LoadedMachine;
 
 /// Version of the header's layout, as `PLOTPLAN_CONFIG_VERSION` of the firmware.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Longest name that `send` puts into the first line of a plan.
 const LONGEST_NAME: usize = 24;
 /// Steps per second of a motor that an `ATmega328P` makes, all within 16 us of their time.
@@ -38,6 +38,12 @@ const GAINS: [f64; 2] = [1.5, 2.0];
 const MODEL: [f64; 3] = [106.67, 0.12, 6.0];
 /// An RC servo's pulse at tick 0 and per 256 ticks, us.
 const SERVO: &str = "{1500, 256}";
+/// Stiction of that arm, %.
+const STICTION_PERCENT: f64 = 8.0;
+/// On its way to a mechanical stop a motor may use this much more than moves it, %.
+const STOP_MARGIN_PERCENT: f64 = 10.0;
+/// The firmware takes an encoder that stands still for 0.1 s for a stop; twice that for what the loop needs.
+const STALL_S: f64 = 0.2;
 /// Error at which the motors stop, counts.
 const FOLLOW_COUNTS: u32 = 40;
 
@@ -94,65 +100,121 @@ pub(super) fn header(loaded: &LoadedMachine, drive: Option<FirmwareDrive>) -> Re
     }
     let [up, down] = pen_pulses(machine);
     let _ = write!(text, "    }},\n    /* .pen: kind, up, down (us) */ {{PEN_SERVO, {up}, {down}}},\n    ");
-    let moves = homing(machine)?;
-    let used = machine.parts().homing.as_ref().is_some_and(|homing| !homing.moves().is_empty());
+    let moves = homing(machine, described.as_ref(), drive)?;
+    let list = machine.parts().homing.as_ref().map_or(&[][..], kinematics::Homing::moves);
+    let used = !list.is_empty();
+    let switches = list.iter().any(|mv| mv.switch.is_some());
     let home = if used { machine.motor_positions(&machine.start()).0.map(f64::round) } else { [0.0; 2] };
     let _ = write!(
         text,
         "/* .homing */ {{{}, {}}},\n    /* .home */ {{{}, {}}}, /* .must_home */ {used},\n    \
-         /* .limits_used, .stop_used */ {used}, false,\n}};\n",
+         /* .limits_used, .stop_used */ {switches}, false,\n}};\n",
         moves[0], moves[1], home[0], home[1]
     );
     Ok(text)
 }
 
 /// Homing moves as the firmware has them: used, switch, ticks of each motor per unit in the direction of the
-/// switch, us per unit fast and slow, units to back off, units after which it fails.
-fn homing(machine: &Machine) -> Result<[String; 2], Failure> {
-    let mut texts = ["{false, 0, {0, 0}, 0, 0, 0, 0}", "{false, 0, {0, 0}, 0, 0, 0, 0}"].map(str::to_owned);
+/// switch, us per unit fast and slow, units to back off, units after which it fails, duty at a stop.
+fn homing(
+    machine: &Machine,
+    described: Option<&Drive>,
+    drive: FirmwareDrive,
+) -> Result<[String; 2], Failure> {
+    let mut texts = ["{false, 0, {0, 0}, 0, 0, 0, 0, 0}"; 2].map(str::to_owned);
     let Some(homing) = &machine.parts().homing else { return Ok(texts) };
+    if homing.needs_stop() && drive == FirmwareDrive::Servo {
+        return Err(Failure::Usage(anyhow!(
+            "an RC servo goes where its pulse says and finds nothing at a mechanical stop: state a pose in [homing]"
+        )));
+    }
     let mut switches: Vec<&str> = Vec::new();
     for (text, mv) in texts.iter_mut().zip(homing.moves()) {
-        let Some(switch) = mv.switch.as_deref() else {
-            return Err(Failure::Usage(anyhow!("the firmware homes by switches, not by a mechanical stop")));
-        };
-        if !switches.contains(&switch) {
+        if let Some(switch) = mv.switch.as_deref()
+            && !switches.contains(&switch)
+        {
             switches.push(switch);
         }
-        let number = switches.iter().position(|other| *other == switch).unwrap_or(0);
+        let number = switches.iter().position(|other| mv.switch.as_deref() == Some(*other));
+        let contact = number.map_or_else(|| "PLOTPLAN_STOP".to_owned(), |number| number.to_string());
         let ticks = mv.ticks_per_unit(machine);
         let most = ticks[0].abs().max(ticks[1].abs());
-        let travel_ticks = mv.timeout_s * mv.speed.abs() * most;
-        // Whole ticks in the ratio of the motors, few enough for the firmware's bytes, enough that
-        // its counter holds the longest way.
-        let fewest = (travel_ticks / f64::from(u16::MAX)).ceil().max(1.0) as u32;
-        let error = |n: u32| {
-            let off = |ticks: f64| {
-                let wanted = ticks / most * f64::from(n);
-                (wanted - wanted.round()).abs() / f64::from(n)
-            };
-            off(ticks[0]).max(off(ticks[1]))
+        // A stepper does not feel a stop: it makes the whole way in any case.
+        let longest = match (number, drive) {
+            (None, FirmwareDrive::Step) => mv.travel + mv.back_off,
+            _ => mv.timeout_s * mv.speed.abs(),
         };
-        let units = (fewest..=MOST_TICKS_PER_UNIT).find(|n| error(*n) < 0.002);
-        let units =
-            units.or_else(|| (fewest..=MOST_TICKS_PER_UNIT).min_by(|a, b| error(*a).total_cmp(&error(*b))));
-        let Some(n) = units else {
-            return Err(Failure::Usage(anyhow!(
-                "the way to switch {switch} is too long for the firmware's counter"
-            )));
+        let Some(n) = unit_ticks(ticks, longest) else {
+            let what = mv.switch.as_deref().map_or("the stop".to_owned(), |name| format!("switch {name}"));
+            return Err(Failure::Usage(anyhow!("the way to {what} is too long for the firmware's counter")));
         };
         let unit = f64::from(n) / most;
-        let [a, b] = ticks.map(|ticks| (ticks / most * f64::from(n) * mv.speed.signum()).round());
+        // Adding 0 makes 0 of -0.
+        let [a, b] = ticks.map(|ticks| (ticks / most * f64::from(n) * mv.speed.signum()).round() + 0.0);
         let us = |speed: f64| (unit / speed * 1e6).round().clamp(1.0, f64::from(u16::MAX));
+        let mut duty = 0.0;
+        if number.is_none() && drive == FirmwareDrive::Dc {
+            duty = stop_duty(described, ticks.map(|ticks| ticks * mv.speed));
+            check_back_off(mv, described, ticks, duty)?;
+        }
         *text = format!(
-            "{{true, {number}, {{{a}, {b}}}, {}, {}, {}, {}}}",
+            "{{true, {contact}, {{{a}, {b}}}, {}, {}, {}, {}, {duty}}}",
             us(mv.speed.abs()),
             us(mv.slow_speed),
             (mv.back_off / unit).ceil(),
-            (travel_ticks / most / unit).ceil()
+            (longest / unit).ceil()
         );
     }
     Ok(texts)
+}
+
+/// Checks that a motor that has backed off from a stop feels it again. The setpoint passes the stop by the error at
+/// which the duty is at its limit, and then for the time in which the encoder must stand still; the second approach
+/// ends one `back_off` behind the stop.
+fn check_back_off(mv: &HomingMove, drive: Option<&Drive>, ticks: [f64; 2], duty: f64) -> Result<(), Failure> {
+    for (motor, ticks) in ticks.into_iter().enumerate().filter(|(_, ticks)| *ticks != 0.0) {
+        let ([kp, _], _) = gains(drive, motor);
+        let least = duty / DUTY_PER_PERCENT / kp + STALL_S * mv.slow_speed * ticks.abs();
+        let counts = mv.back_off * ticks.abs();
+        if counts < least {
+            return Err(Failure::Usage(anyhow!(
+                "back_off of a homing move to a stop is {counts:.0} counts of its motor, but the loop feels the stop \
+                 {least:.0} counts behind it: state a longer way, or a larger kp in [drive]"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Ticks of the faster motor in a unit of a homing move with these ticks per mm or rad: whole ticks of both in
+/// their ratio, few enough for the firmware's bytes, enough that its counter holds the longest way.
+fn unit_ticks(ticks: [f64; 2], longest: f64) -> Option<u32> {
+    let most = ticks[0].abs().max(ticks[1].abs());
+    let fewest = (longest * most / f64::from(u16::MAX)).ceil().max(1.0) as u32;
+    let error = |n: u32| {
+        let off = |ticks: f64| {
+            let wanted = ticks / most * f64::from(n);
+            (wanted - wanted.round()).abs() / f64::from(n)
+        };
+        off(ticks[0]).max(off(ticks[1]))
+    };
+    (fewest..=MOST_TICKS_PER_UNIT)
+        .find(|n| error(*n) < 0.002)
+        .or_else(|| (fewest..=MOST_TICKS_PER_UNIT).min_by(|a, b| error(*a).total_cmp(&error(*b))))
+}
+
+/// The largest duty of motors on their way to a mechanical stop at this speed, ticks/s: what moves the stiffer of
+/// them, and a margin.
+fn stop_duty(drive: Option<&Drive>, ticks_s: [f64; 2]) -> f64 {
+    let percent = |motor: usize| {
+        let (_, [g, ..]) = gains(drive, motor);
+        let stiction = match drive.map(|drive| &drive.motors[motor].plant) {
+            Some(MotorPlant::Dc(plant)) => plant.stiction_percent,
+            _ => STICTION_PERCENT,
+        };
+        if ticks_s[motor] == 0.0 { 0.0 } else { stiction + ticks_s[motor].abs() / g + STOP_MARGIN_PERCENT }
+    };
+    (percent(0).max(percent(1)).min(100.0) * DUTY_PER_PERCENT).round()
 }
 
 /// Pulses of the pen's servo with the pen up and down, us: those of the machine file, or two to adjust.
