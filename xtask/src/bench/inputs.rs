@@ -27,16 +27,25 @@ pub(super) fn write(folder: &Path) -> Result<()> {
         ("bare", bare),
     ] {
         for (name, size) in SIZES {
-            let mut random = Random(7);
-            let mut bytes = b"IN;SP1;".to_vec();
-            while bytes.len() < size {
-                make(&mut bytes, &mut random);
-            }
-            bytes.extend(b"PU0,0;SP0;\n");
-            std::fs::write(folder.join(format!("{class}-{name}.plt")), bytes)?;
+            std::fs::write(folder.join(format!("{class}-{name}.plt")), file(size, make))?;
         }
     }
     Ok(())
+}
+
+fn file(size: usize, make: impl Fn(&mut Vec<u8>, &mut Random)) -> Vec<u8> {
+    let mut random = Random(7);
+    let mut bytes = b"IN;SP1;".to_vec();
+    while bytes.len() < size {
+        make(&mut bytes, &mut random);
+    }
+    bytes.extend(b"PU0,0;SP0;\n");
+    bytes
+}
+
+/// Text of that many bytes.
+pub(super) fn text_of(size: usize) -> Vec<u8> {
+    file(size, text)
 }
 
 fn push(bytes: &mut Vec<u8>, text: &str) {

@@ -1,6 +1,7 @@
 //! Benchmarks: figures beside those of peers, by CPU time.
 
 mod inputs;
+mod large;
 mod place;
 mod plan;
 mod read;
@@ -35,6 +36,11 @@ pub(crate) fn simulate() -> Result<bool> {
         return released(&["simulate".as_ref()]);
     }
     simulate::run()
+}
+
+/// `bench large`; true if all goals were met.
+pub(crate) fn large() -> Result<bool> {
+    large::run()
 }
 
 /// `bench place`; true if all goals were met.
