@@ -2,8 +2,8 @@
 
 use drawing::{Line, Point, Rect, Segment, Vec2};
 use kinematics::{
-    Cartesian, FiveBar, JointRange, Machine, MachineParts, Mechanism, Motor, Polargraph, TwoLink,
-    reach_outlines,
+    Cartesian, FiveBar, JointKind, JointPos, JointRange, Machine, MachineParts, Mechanism, Motor, Polargraph,
+    TwoLink, reach_outlines,
 };
 use test_support::machines;
 
@@ -132,5 +132,27 @@ fn clearance_of_a_pose_far_from_the_border_is_some_millimetres() {
         for point in around.map(|way| centre + clearance * way) {
             assert!(machine.mechanism().inverse(point).is_ok(), "{point}");
         }
+    }
+}
+
+/// By the second difference of the pen's path: the bound holds for every direction of the joints, and is not
+/// far from what some direction takes.
+#[test]
+fn second_derivative_bound_holds_and_is_not_loose() {
+    for machine in [five_bar(), polargraph()] {
+        let mechanism = machine.mechanism();
+        let from = mechanism.inverse(machine.sheet().center()).expect("within reach");
+        let mut tightest = f64::INFINITY;
+        for k in 0..64 {
+            let way = Vec2::from_angle(f64::from(k) * std::f64::consts::TAU / 64.0);
+            let step = if mechanism.joint_kinds()[0] == JointKind::Revolute { 0.001 } else { 0.1 };
+            let at = |share: f64| from + JointPos::new(way.x, way.y) * (step * share);
+            let [p0, p1, p2] = [0.0, 0.5, 1.0].map(|share| mechanism.forward(&at(share)));
+            let second = 4.0 * ((p2 - p1) - (p1 - p0)).hypot();
+            let bound = mechanism.second_derivative_bound(&from, &at(1.0));
+            assert!(second <= bound * 1.001, "{mechanism:?}, direction {k}: {second} above {bound}");
+            tightest = tightest.min(bound / second);
+        }
+        assert!(tightest < 8.0, "{mechanism:?}: at best {tightest} times the second derivative");
     }
 }
