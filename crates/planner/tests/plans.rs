@@ -62,7 +62,7 @@ fn stroke() -> impl Strategy<Value = Stroke> {
 }
 
 fn drawing() -> impl Strategy<Value = Drawing> {
-    proptest::collection::vec(stroke(), 1..4).prop_map(|strokes| Drawing::from(strokes))
+    proptest::collection::vec(stroke(), 1..4).prop_map(Drawing::from)
 }
 
 fn fitted(machine: &Machine, drawing: &Drawing) -> Drawing {

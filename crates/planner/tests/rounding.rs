@@ -35,7 +35,7 @@ fn drawing() -> impl Strategy<Value = Drawing> {
         stroke
     });
     let stroke = prop_oneof![prop::collection::vec(point(), 1..6).prop_map(polyline), walk, arc];
-    prop::collection::vec(stroke, 1..5).prop_map(|strokes| Drawing::from(strokes))
+    prop::collection::vec(stroke, 1..5).prop_map(Drawing::from)
 }
 
 fn law() -> impl Strategy<Value = TimingLaw> {

@@ -75,7 +75,7 @@ pub(super) fn run(generator: Option<&Path>) -> Result<bool> {
         for wanted in wanted {
             match *wanted {
                 Wanted::Speed(wanted) if speed(figures.large) < wanted => {
-                    missed.push(format!("{wanted} MB/s"))
+                    missed.push(format!("{wanted} MB/s"));
                 }
                 Wanted::TimesPeer(wanted) if times.is_some_and(|times| times < wanted) => {
                     missed.push(format!("{wanted} times hp2xx"));

@@ -79,7 +79,7 @@ impl PageReport {
         let drawing = &page.drawing;
         Self {
             strokes: drawing.strokes.len(),
-            dots: drawing.strokes.iter().filter(|stroke| stroke.is_dot()).count(),
+            dots: drawing.strokes.iter().filter(drawing::Stroke::is_dot).count(),
             ink_mm: round::mm(drawing.length()),
             bounds_mm: drawing.bounding_box().map(corners),
             pens: drawing.pens().into_iter().map(|pen| PenReport::of(page, drawing, pen)).collect(),

@@ -62,7 +62,7 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<(), Failure> {
             text.push_str("ink      none\n");
             continue;
         };
-        let dots = drawing.strokes.iter().filter(|stroke| stroke.is_dot()).count();
+        let dots = drawing.strokes.iter().filter(drawing::Stroke::is_dot).count();
         let _ = writeln!(text, "strokes  {} ({})", drawing.strokes.len(), pluralize(dots, "dot"));
         let _ = writeln!(text, "ink      {}", length(drawing.length()));
         let _ = writeln!(
