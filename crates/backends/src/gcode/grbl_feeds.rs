@@ -176,9 +176,14 @@ pub(super) fn find<I: Iterator<Item = Setpoint>>(job: &Job<'_>, setpoints: impl 
         for deviation_mm in JUNCTION_DEVIATIONS_MM {
             settings.junction_deviation_mm = deviation_mm;
             routes = faster(job, &chords, most_mm_s, &settings);
-            if fits(&settings, &routes) {
+            is_fast = fits(&settings, &routes);
+            if is_fast {
                 break;
             }
+        }
+        if !is_fast {
+            // Something else takes the time, such as a slow Z axis: strokes stay as they are drawn.
+            routes = vec![Route::Drawn; job.drawing.strokes.len()];
         }
     }
     let mut speeds_mm_s: Vec<f64> = (job.drawing.strokes.iter().zip(&routes).zip(job.times_s))
