@@ -157,21 +157,10 @@ fn has_at_most(drawing: &Drawing, segments: usize) -> bool {
     })
 }
 
-/// What splines aim at, by how long the motors build up their acceleration.
-///
-/// Relative to the optimum within the tolerance under jerk limits, seven strokes took on the smoothest
-/// path 1.040 (20 ms) and 1.070 (100 ms), on the fastest path without jerk 1.040 and 1.170, and with
-/// the third derivative added to the time at this weight 1.022 and 1.113.
+/// What splines aim at.
 fn aim(machine: &Machine) -> Aim {
-    let build_up = machine
-        .motors()
-        .iter()
-        .filter_map(|motor| motor.max_jerk_ticks_s3.map(|jerk| motor.max_acceleration_ticks_s2 / jerk));
-    match build_up.reduce(f64::max) {
-        None => Aim::Fastest,
-        Some(build_up) if build_up <= 0.04 => Aim::FastAndSmooth(0.15 * build_up),
-        Some(_) => Aim::Smoothest,
-    }
+    let has_jerk = machine.motors().iter().any(|motor| motor.max_jerk_ticks_s3.is_some());
+    if has_jerk { Aim::FastestUnderJerk } else { Aim::Fastest }
 }
 
 /// Checks that every setting is in its valid range.

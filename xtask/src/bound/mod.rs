@@ -9,8 +9,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result};
-use kinematics::Machine;
+use drawing::{Drawing, Pen, Point, Span, Stroke};
+use kinematics::{Machine, MotorPos};
+use planner::{Settings, plan};
 use serde_json::{Value, json};
+use test_support::machines::with_jerk;
 use test_support::band::{Setup, TOLERANCE_MM, setups, strokes};
 
 /// Times in which the motors build up their acceleration, ms; 0 without a jerk limit.
@@ -28,7 +31,8 @@ type Key = (String, String, String);
 pub(crate) fn run(python: &str, all: bool) -> Result<bool> {
     let table = crate::top().join(TABLE);
     let mut rows = if all { BTreeMap::new() } else { read(&table)? };
-    let missing: Vec<Value> = problems().into_iter().filter(|p| !rows.contains_key(&key_of(p))).collect();
+    let missing = problems().into_iter().filter(|p| !rows.contains_key(&key_of(&p.json)));
+    let missing: Vec<Value> = missing.map(Problem::with_plan).collect::<Result<_>>()?;
     println!("{} optima are in {TABLE}, {} are missing", rows.len(), missing.len());
     if !missing.is_empty() {
         let python = environment(python)?;
@@ -54,16 +58,45 @@ pub(crate) fn run(python: &str, all: bool) -> Result<bool> {
     Ok(rows.values().all(solved))
 }
 
-fn problems() -> Vec<Value> {
+/// A stroke on a machine.
+struct Problem {
+    machine: Machine,
+    points: Vec<Point>,
+    json: Value,
+}
+
+impl Problem {
+    /// For the solver, with our plan as a start: the pen's place every millisecond.
+    fn with_plan(mut self) -> Result<Value> {
+        let stroke = Stroke::polyline(Pen(1), self.points, Span::default()).context("a stroke of points")?;
+        let settings = Settings::new(TOLERANCE_MM, 1000);
+        let trajectory = plan(&self.machine, Drawing { strokes: vec![stroke] }, &settings)?;
+        let rows = trajectory.rows().filter(|row| row.row.pen != 0);
+        let places =
+            rows.map(|row| self.machine.forward_from_motors(&MotorPos::new(row.exact[0], row.exact[1])));
+        let places: Vec<[f64; 2]> = places.map(|p| [p.x, p.y]).collect();
+        self.json["plan_mm"] = json!(places);
+        Ok(self.json)
+    }
+}
+
+fn problems() -> Vec<Problem> {
     let mut problems = Vec::new();
     for Setup { name: machine, machine: parts, origin } in setups() {
         for (stroke, points) in strokes() {
-            let points: Vec<[f64; 2]> = points.iter().map(|(x, y)| [origin.x + x, origin.y + y]).collect();
+            let points: Vec<Point> =
+                points.iter().map(|(x, y)| Point::new(origin.x + x, origin.y + y)).collect();
+            let places: Vec<[f64; 2]> = points.iter().map(|p| [p.x, p.y]).collect();
             for build_up in BUILD_UPS_MS {
-                problems.push(json!({
+                let json = json!({
                     "machine": describe(machine, &parts), "stroke": stroke, "build_up_ms": build_up,
-                    "tolerance_mm": TOLERANCE_MM, "points_mm": points,
-                }));
+                    "tolerance_mm": TOLERANCE_MM, "points_mm": places,
+                });
+                let machine = match build_up {
+                    0 => parts.clone(),
+                    ms => with_jerk(&parts, 1e-3 * f64::from(ms)),
+                };
+                problems.push(Problem { machine, points: points.clone(), json });
             }
         }
     }
@@ -110,7 +143,7 @@ fn read(table: &Path) -> Result<BTreeMap<Key, String>> {
 /// In the order of the problems.
 fn write(table: &Path, rows: &BTreeMap<Key, String>) -> Result<()> {
     let mut text = format!("{HEADER}\n");
-    for row in problems().iter().filter_map(|problem| rows.get(&key_of(problem))) {
+    for row in problems().iter().filter_map(|problem| rows.get(&key_of(&problem.json))) {
         writeln!(text, "{row}")?;
     }
     Ok(std::fs::write(table, text)?)

@@ -7,7 +7,9 @@ polyline in mm, status of the solver, nodes. Needs casadi and numpy.
 Unknowns are position, speed and acceleration of both motors at the nodes, the jerk (without a jerk
 limit the acceleration) between them, and one duration of a step for each line of the stroke. The
 pen stays within the tolerance of the line at nodes and half way between them, and passes each
-vertex within the tolerance. ipopt finds a local optimum: an upper bound on the optimum.
+vertex within the tolerance. ipopt finds a local optimum: an upper bound on the optimum. It starts
+from a plan (a point of the pen every millisecond, `plan_mm`) and from the centre line, and the faster
+result counts.
 """
 
 import json
@@ -19,8 +21,10 @@ import numpy as np
 
 # Nodes of a stroke, and the least number of a line.
 NODES, LEAST = 140, 3
-# Speeds of the first guess, mm/s: the next one where ipopt gets stuck.
+# Speeds of guesses along the centre line, mm/s: the next one where ipopt gets stuck.
 GUESSES = 8.0, 4.0, 16.0
+# Seconds of CPU for one solution.
+PATIENCE = 120.0
 
 
 class Motors:
@@ -56,7 +60,58 @@ class Motors:
         return self.coupling @ q / self.unit
 
 
-def solve(motors, points, tolerance, build_up, gentle):
+def gentle_guess(motors, points, counts, speed, jerky):
+    """Along the lines at one speed."""
+    lines = np.diff(points, axis=0)
+    lengths = np.hypot(lines[:, 0], lines[:, 1])
+    total = sum(counts)
+    m, v = np.zeros((2, total + 1)), np.zeros((2, total + 1))
+    i = 0
+    for k, count in enumerate(counts):
+        for share in np.arange(count) / count:
+            p = points[k] + lines[k] * share
+            m[:, i] = motors.at(p)
+            v[:, i] = (motors.at(p + 1e-4 * lines[k] / lengths[k]) - m[:, i]) / 1e-4 * speed
+            i += 1
+    m[:, total] = motors.at(points[-1])
+    v[:, 0] = 0.0
+    a = np.zeros((2, total + 1 if jerky else total))
+    j = np.zeros((2, total if jerky else 0))
+    return m, v, a, j, np.maximum(lengths / speed / counts, 1e-4)
+
+
+def plan_guess(motors, points, counts, plan, jerky):
+    """Along a plan."""
+    path = np.array([motors.at(p) for p in plan]).T
+    # The rows nearest to the vertices, in order: least sum of squares by dynamic programming.
+    rows = len(plan)
+    square = ((plan[None, :, :] - points[:, None, :]) ** 2).sum(axis=2)
+    best, choices = np.full(rows, np.inf), []
+    best[0] = 0.0
+    for k in range(1, len(points)):
+        # The least before each row, and where it is.
+        least = np.minimum.accumulate(best)
+        where = np.maximum.accumulate(np.where(best == least, np.arange(rows), 0))
+        best = square[k] + np.concatenate([[np.inf], least[:-1]])
+        choices.append(np.concatenate([[0], where[:-1]]))
+    at = [rows - 1]
+    for where in reversed(choices):
+        at.append(int(where[at[-1]]))
+    at = np.array(at[::-1], dtype=float)
+    steps = 1e-3 * np.maximum(np.diff(at), 0.2) / counts
+    nodes = np.concatenate([at[k] + np.diff(at)[k] * np.arange(n) / n for k, n in enumerate(counts)] + [at[-1:]])
+    sampled = lambda of, t: np.array([np.interp(t, np.arange(rows), values) for values in of])
+    speed = np.gradient(path, 1e-3, axis=1)
+    acceleration = np.gradient(speed, 1e-3, axis=1)
+    v = sampled(speed, nodes)
+    v[:, [0, -1]] = 0.0
+    a = sampled(acceleration, nodes if jerky else 0.5 * (nodes[1:] + nodes[:-1]))
+    a = np.clip(a, -0.99 * motors.acceleration[:, None], 0.99 * motors.acceleration[:, None])
+    j = np.diff(a, axis=1) / np.repeat(steps, counts) if jerky else np.zeros((2, 0))
+    return sampled(path, nodes), v, a, j, steps
+
+
+def solve(motors, points, tolerance, build_up, start):
     lines = np.diff(points, axis=0)
     lengths = np.hypot(lines[:, 0], lines[:, 1])
     counts = [max(LEAST, math.ceil(NODES * length / lengths.sum())) for length in lengths]
@@ -65,19 +120,9 @@ def solve(motors, points, tolerance, build_up, gentle):
     a = ca.MX.sym("a", 2, total + 1 if jerky else total)
     j = ca.MX.sym("j", 2, total if jerky else 0)
     steps = ca.MX.sym("T", len(counts))
-    guess_m, guess_v = np.zeros((2, total + 1)), np.zeros((2, total + 1))
     first = np.concatenate([[0], np.cumsum(counts)])
     line_of = np.repeat(np.arange(len(counts)), counts)
     direction = lines / lengths[:, None]
-    for k, count in enumerate(counts):
-        for i in range(count):
-            p = points[k] + lines[k] * (i / count)
-            guess_m[:, first[k] + i] = motors.at(p)
-            ahead = motors.at(p + 1e-4 * direction[k])
-            guess_v[:, first[k] + i] = (ahead - guess_m[:, first[k] + i]) / 1e-4 * gentle
-    guess_m[:, total] = motors.at(points[-1])
-    guess_v[:, 0] = 0.0
-
     constraints, low, high = [], [], []
 
     def hold(value, least, most):
@@ -128,15 +173,16 @@ def solve(motors, points, tolerance, build_up, gentle):
             hold(a[:, end], 0, 0)
 
     unknowns = ca.vertcat(ca.vec(m), ca.vec(v), ca.vec(a), ca.vec(j), steps)
-    guess = np.concatenate(
-        [guess_m.T.ravel(), guess_v.T.ravel(), np.zeros(a.numel() + j.numel())]
-        + [np.maximum(lengths / gentle / counts, 1e-4)]
-    )
+    is_plan = not np.isscalar(start)
+    guess = (plan_guess if is_plan else gentle_guess)(motors, points, counts, start, jerky)
+    guess = np.concatenate([part.T.ravel() for part in guess])
     lowest = np.full(len(guess), -np.inf)
     lowest[-len(counts) :] = 1e-6
     time = sum(count * steps[k] for k, count in enumerate(counts))
     options = {"ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes", "ipopt.tol": 1e-6}
-    options |= {"ipopt.max_iter": 3000, "ipopt.max_cpu_time": 120.0}
+    options |= {"ipopt.max_iter": 3000, "ipopt.max_cpu_time": PATIENCE}
+    if is_plan:
+        options |= {"ipopt.mu_init": 1e-3, "ipopt.bound_push": 1e-4, "ipopt.bound_frac": 1e-4}
     problem = {"x": unknowns, "f": time, "g": ca.vertcat(*constraints)}
     solver = ca.nlpsol("solver", "ipopt", problem, options)
     found = solver(x0=guess, lbx=lowest, lbg=low, ubg=high)
@@ -164,11 +210,15 @@ def main():
         points = np.array(problem["points_mm"])
         motors = Motors(problem["machine"])
         ms = problem["build_up_ms"]
-        for gentle in GUESSES:
-            found = solve(motors, points, problem["tolerance_mm"], 1e-3 * ms, gentle)
-            if found[2] == "Solve_Succeeded":
+        found = []
+        for start in (np.array(problem["plan_mm"]), *GUESSES):
+            found.append(solve(motors, points, problem["tolerance_mm"], 1e-3 * ms, start))
+            print(problem["stroke"], ms, *found[-1], file=sys.stderr, flush=True)
+            solved = [f for f in found if f[2] == "Solve_Succeeded"]
+            # From the plan, and once from the centre line.
+            if len(found) >= 2 and solved:
                 break
-        seconds, off, status, nodes = found
+        seconds, off, status, nodes = min(solved or found)
         fields = (problem["machine"]["name"], problem["stroke"], ms, f"{seconds:.5f}", f"{off:.4f}", status, nodes)
         print(*fields, sep="\t", flush=True)
 

@@ -50,7 +50,7 @@ pub struct PathBudget {
 pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
     let pieces = clean(stroke, budget.chord_mm);
     let pieces =
-        if budget.simplify_mm > 0.0 { simplify::simplify(pieces, budget.simplify_mm) } else { pieces };
+        if budget.simplify_mm > 0.0 { simplify::simplify(&pieces, budget.simplify_mm) } else { pieces };
     let sections = blend::sections(&pieces, budget.blend_mm, budget.corner).into_iter().map(parametrise);
     sections
         .map(
@@ -63,7 +63,7 @@ pub fn sections(stroke: &Stroke, budget: &PathBudget) -> Vec<Section> {
 
 /// About the length of the shortest path within `tolerance` mm of a stroke, mm.
 pub(crate) fn shortest_length(stroke: &Stroke, tolerance: f64) -> f64 {
-    simplify::simplify(clean(stroke, tolerance), tolerance).iter().map(Segment::length).sum()
+    simplify::simplify(&clean(stroke, tolerance), tolerance).iter().map(Segment::length).sum()
 }
 
 /// Every piece of a stroke as a section of its own: the pen stops at every vertex, except between

@@ -1,11 +1,11 @@
 //! Polyline simplification within a tolerance: many vertices only reflect the grid of the program
 //! that made the file.
 
-use drawing::{Line, Point, Segment, kept_vertices};
+use drawing::{Line, Point, Segment, distance_to_line, kept_vertices};
 
 /// Replaces sequences of lines by fewer lines, such that every point of either polyline is within
 /// `tolerance` mm of the other ([`drawing::kept_vertices`]).
-pub(super) fn simplify(pieces: Vec<Segment>, tolerance: f64) -> Vec<Segment> {
+pub(super) fn simplify(pieces: &[Segment], tolerance: f64) -> Vec<Segment> {
     let mut simplified = Vec::with_capacity(pieces.len());
     let mut run: Vec<Point> = Vec::new();
     for piece in pieces {
@@ -18,12 +18,30 @@ pub(super) fn simplify(pieces: Vec<Segment>, tolerance: f64) -> Vec<Segment> {
             }
             curve => {
                 flush(&mut run, tolerance, &mut simplified);
-                simplified.push(curve);
+                simplified.push(*curve);
             }
         }
     }
     flush(&mut run, tolerance, &mut simplified);
     simplified
+}
+
+/// The largest distance of a vertex of `pieces` from the line that replaces it in `simplified`, which
+/// is the result of [`simplify`]; at most its tolerance, and the deviation in both directions.
+pub(super) fn deviation(pieces: &[Segment], simplified: &[Segment]) -> f64 {
+    let mut pieces = pieces.iter();
+    let mut largest = 0.0_f64;
+    for piece in simplified {
+        let Some(before) = pieces.next() else { break };
+        let Segment::Line(line) = piece else { continue };
+        let mut vertex = before.end();
+        while vertex != line.p1 {
+            largest = largest.max(distance_to_line(vertex, *line));
+            let Some(next) = pieces.next() else { return largest };
+            vertex = next.end();
+        }
+    }
+    largest
 }
 
 fn flush(run: &mut Vec<Point>, tolerance: f64, to: &mut Vec<Segment>) {
@@ -69,7 +87,7 @@ mod tests {
                 }
             }
             let before = lines(&points);
-            let after = simplify(before.clone(), tolerance);
+            let after = simplify(&before, tolerance);
             prop_assert!(after.len() <= before.len());
             for (one, other) in [(&before, &after), (&after, &before)] {
                 for segment in one {

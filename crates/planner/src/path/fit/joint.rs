@@ -23,15 +23,12 @@ use super::{
     banded::Banded,
     limits::{Limits, MotorForms},
     spline::Spline,
-    tube::{Energy, add_pair, disc, sum_of_logs},
+    tube::{add_pair, disc, sum_of_logs},
 };
 
-/// Number of Newton steps on a block. On four drawings of the corpus 10 save another 0.04 % of the
-/// time and take a third more instructions; 5 take 0.5 % longer.
-const STEPS: usize = 7;
-
-/// The same with smoothing, which takes longer to settle.
-const SMOOTHING_STEPS: usize = 10;
+/// Number of Newton steps on a block. On the strokes of `tests/band.rs` 7 steps take 0.3 % longer, 10
+/// another 0.2 % less.
+const STEPS: usize = 8;
 
 /// The barrier's weight a constraint at first, and at which a block is finished, as shares of the
 /// duration.
@@ -42,7 +39,7 @@ const LAST_WEIGHT: f64 = 1e-3;
 const GENTLE: (f64, f64) = (0.5, 0.8);
 
 /// Places on a span at which limits are held, as shares of its length.
-const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
+pub(super) const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
 
 /// A span of the spline. In terms of the change of S over it divided by its length, D, and of S'' at
 /// its ends, P and R, with the share f of its length:
@@ -50,20 +47,36 @@ const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
 /// ```text
 /// S' = D + h ((1/6 - (1 - f)²/2) P + (f²/2 - 1/6) R),   S'' = (1 - f) P + f R
 /// ```
-struct Span {
+pub(super) struct SpanForms {
     /// Weights of the control points j - 1 to j + 2 for D, P and R.
-    rows: [[f64; 4]; 3],
-    length: f64,
+    pub(super) rows: [[f64; 4]; 3],
+    pub(super) length: f64,
     /// At each place.
-    forms: [MotorForms; 3],
+    pub(super) forms: [MotorForms; 3],
     /// Whether a motor may reach its speed limit before the pen does, by motor.
-    may_limit_speed: [bool; 2],
+    pub(super) may_limit_speed: [bool; 2],
 }
 
-impl Span {
+impl SpanForms {
+    /// Of span j; `None` if it leaves the reach.
+    pub(super) fn of(limits: &Limits<'_>, spline: &Spline, j: usize) -> Option<Self> {
+        let forms = if let Some(forms) = limits.everywhere() {
+            [forms; 3]
+        } else {
+            let curve = drawing::Segment::Cubic(spline.bezier(j));
+            let at = |share: f64| limits.near(curve.eval(share));
+            [at(PLACES[0])?, at(PLACES[1])?, at(PLACES[2])?]
+        };
+        let may_limit_speed = [0, 1].map(|k| {
+            let fastest = limits.square_pen_speed * limits.square_ratios[k];
+            forms.iter().any(|forms| forms.linear[k].hypot2() * fastest > 1.0)
+        });
+        Some(Self { rows: spline.span_weights(j), length: spline.span(j), forms, may_limit_speed })
+    }
+
     /// D, P and R.
     #[inline]
-    fn bends(&self, control: &[Vec2], j: usize) -> [Vec2; 3] {
+    pub(super) fn bends(&self, control: &[Vec2], j: usize) -> [Vec2; 3] {
         let last = control.len() - 1;
         // Where an index is clamped its weight is 0.
         let points = [0, 1, 2, 3].map(|k| control[(j + k).saturating_sub(1).min(last)]);
@@ -72,14 +85,14 @@ impl Span {
 
     /// Weights of P and R for S' at a place.
     #[inline]
-    fn weights(&self, place: usize) -> [f64; 2] {
+    pub(super) fn weights(&self, place: usize) -> [f64; 2] {
         let f = PLACES[place];
         [self.length * (1.0 / 6.0 - 0.5 * (1.0 - f) * (1.0 - f)), self.length * (0.5 * f * f - 1.0 / 6.0)]
     }
 
     /// S' and S'' at a place.
     #[inline]
-    fn derivatives(&self, [d, p, r]: &[Vec2; 3], place: usize) -> [Vec2; 2] {
+    pub(super) fn derivatives(&self, [d, p, r]: &[Vec2; 3], place: usize) -> [Vec2; 2] {
         let (f, [by_p, by_r]) = (PLACES[place], self.weights(place));
         [*d + by_p * *p + by_r * *r, (1.0 - f) * *p + f * *r]
     }
@@ -87,7 +100,7 @@ impl Span {
 
 /// Whether speed limits are held at a place: the end of a span is the start of the next one, where
 /// only the change of speed is another.
-fn has_caps(place: usize) -> bool {
+pub(super) fn has_caps(place: usize) -> bool {
     place < 2
 }
 
@@ -96,36 +109,19 @@ pub(super) struct Problem<'a> {
     pub(super) limits: &'a Limits<'a>,
     pub(super) samples: &'a [Point],
     pub(super) radii: &'a [f64],
-    /// What is added to the time, in s.
-    pub(super) smoothing: Option<&'a Energy>,
 }
 
 /// Buffers for the steps.
 #[derive(Default)]
 pub(super) struct Workspace {
     system: Banded<12>,
-    spans: Vec<Span>,
+    spans: Vec<SpanForms>,
     /// A copy of the control points and of b, equal to them outside of a step.
     control: Vec<Vec2>,
     b: Vec<f64>,
 }
 
 impl Problem<'_> {
-    fn span(&self, spline: &Spline, j: usize) -> Option<Span> {
-        let forms = if let Some(forms) = self.limits.everywhere() {
-            [forms; 3]
-        } else {
-            let curve = drawing::Segment::Cubic(spline.bezier(j));
-            let at = |share: f64| self.limits.near(curve.eval(share));
-            [at(PLACES[0])?, at(PLACES[1])?, at(PLACES[2])?]
-        };
-        let may_limit_speed = [0, 1].map(|k| {
-            let fastest = self.limits.square_pen_speed * self.limits.square_ratios[k];
-            forms.iter().any(|forms| forms.linear[k].hypot2() * fastest > 1.0)
-        });
-        Some(Span { rows: spline.span_weights(j), length: spline.span(j), forms, may_limit_speed })
-    }
-
     /// Low b at all knots from which any limit is some way off; `None` if the path leaves the reach.
     ///
     /// b is at most half of what any motor's curvature term or speed, or the pen's speed allows on
@@ -137,7 +133,7 @@ impl Problem<'_> {
         let mut changes = Vec::with_capacity(count - 1);
         for j in 0..count - 1 {
             let (mut most, mut slowness) = (f64::INFINITY, 0.0_f64);
-            let span = self.span(spline, j)?;
+            let span = SpanForms::of(self.limits, spline, j)?;
             let bends = span.bends(&spline.control, j);
             for (place, forms) in span.forms.iter().enumerate() {
                 let [first, second] = span.derivatives(&bends, place);
@@ -174,7 +170,7 @@ impl Problem<'_> {
         let spans = block.start.saturating_sub(2)..(block.end + 1).min(spline.count() - 1);
         work.spans.clear();
         for j in spans.clone() {
-            work.spans.push(self.span(spline, j)?);
+            work.spans.push(SpanForms::of(self.limits, spline, j)?);
         }
         if work.control.len() != spline.count() {
             work.control.clone_from(&spline.control);
@@ -186,8 +182,7 @@ impl Problem<'_> {
         let constraints = (block.len() * 22) as f64;
         let mut cost = self.cost(spline, &work.control, &work.b, block, &spans, &work.spans)?;
         let mut mu = FIRST_WEIGHT * cost.time / constraints;
-        let steps = if self.smoothing.is_some() { SMOOTHING_STEPS } else { STEPS };
-        for _ in 0..steps {
+        for _ in 0..STEPS {
             self.assemble(spline, b, block, &spans, mu, work);
             if !work.system.solve() {
                 break;
@@ -238,7 +233,7 @@ impl Problem<'_> {
         b: &[f64],
         block: &Range<usize>,
         spans: &Range<usize>,
-        of: &[Span],
+        of: &[SpanForms],
     ) -> Option<Cost> {
         if block.clone().any(|i| b[i].is_nan() || b[i] <= 0.0) {
             return None;
@@ -246,11 +241,6 @@ impl Problem<'_> {
         let mut time = 0.0;
         for (j, span) in spans.clone().zip(of) {
             time += 2.0 * span.length / (b[j].sqrt() + b[j + 1].sqrt());
-        }
-        if let Some(energy) = self.smoothing {
-            // A control point changes the second derivative of the knots next to it.
-            let knots = block.start - 1..(block.end + 2).min(spline.count());
-            time += energy.of(spline, control, knots);
         }
         let knots = (block.start - 1).max(1)..(block.end + 1).min(spline.count() - 1);
         let discs = knots.map(|i| {
@@ -267,7 +257,7 @@ impl Problem<'_> {
 
     /// The product of all slacks of a span, -1 if one is not positive.
     #[inline]
-    fn slack(&self, span: &Span, bends: &[Vec2; 3], [b0, b1]: [f64; 2]) -> f64 {
+    fn slack(&self, span: &SpanForms, bends: &[Vec2; 3], [b0, b1]: [f64; 2]) -> f64 {
         let half_c = 0.5 * (b1 - b0) / span.length;
         let mut product = 1.0;
         let mut valid = true;
@@ -305,20 +295,6 @@ impl Problem<'_> {
         let Workspace { system, spans: of, .. } = work;
         let (from, count) = (block.start, block.len());
         system.reset(3 * count);
-        if let Some(energy) = self.smoothing {
-            for i in block.clone() {
-                let gradient = energy.gradient(&spline.control, i);
-                for (distance, value) in energy.row(i).iter().enumerate() {
-                    if i + distance < block.end {
-                        let (p, q) = (3 * (i - from), 3 * (i + distance - from));
-                        system.add(p, q, *value);
-                        system.add(p + 1, q + 1, *value);
-                    }
-                }
-                system.right[3 * (i - from)] -= gradient.x;
-                system.right[3 * (i - from) + 1] -= gradient.y;
-            }
-        }
         let knots = (block.start - 1).max(1)..(block.end + 1).min(spline.count() - 1);
         for i in knots {
             let row = spline.value[i];
@@ -349,7 +325,7 @@ impl Problem<'_> {
     #[inline]
     fn add_place(
         &self,
-        span: &Span,
+        span: &SpanForms,
         place: usize,
         bends: &[Vec2; 3],
         [b0, b1]: [f64; 2],
@@ -498,7 +474,7 @@ impl Local {
 
 /// `rowsᵀ m rows`.
 #[inline]
-fn both(rows: &[[f64; 4]; 3], m: &[[f64; 3]; 3]) -> [[f64; 4]; 4] {
+pub(super) fn both(rows: &[[f64; 4]; 3], m: &[[f64; 3]; 3]) -> [[f64; 4]; 4] {
     let half = [0, 1, 2]
         .map(|p| [0, 1, 2, 3].map(|l| m[p][0] * rows[0][l] + m[p][1] * rows[1][l] + m[p][2] * rows[2][l]));
     [0, 1, 2, 3].map(|k| {

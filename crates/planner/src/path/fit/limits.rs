@@ -11,6 +11,8 @@ pub struct Limits<'a> {
     pub(super) square_pen_speed: f64,
     /// The squared ratio of each motor's acceleration limit to its speed limit, 1/s².
     pub(super) square_ratios: [f64; 2],
+    /// The time in which each motor builds up its acceleration, s; 0 without a jerk limit.
+    pub(super) build_ups_s: [f64; 2],
     /// The derivatives everywhere on a machine with linear kinematics.
     everywhere: Option<MotorForms>,
 }
@@ -32,8 +34,12 @@ impl<'a> Limits<'a> {
             let ratio = motor.max_acceleration_ticks_s2 / motor.max_speed_ticks_s;
             ratio * ratio
         });
-        let mut limits =
-            Self { machine, square_pen_speed: pen_mm_s * pen_mm_s, square_ratios, everywhere: None };
+        let build_ups_s = machine
+            .motors()
+            .each_ref()
+            .map(|motor| motor.max_jerk_ticks_s3.map_or(0.0, |jerk| motor.max_acceleration_ticks_s2 / jerk));
+        let square_pen_speed = pen_mm_s * pen_mm_s;
+        let mut limits = Self { machine, square_pen_speed, square_ratios, build_ups_s, everywhere: None };
         if machine.mechanism().is_linear() {
             limits.everywhere = limits.evaluate(machine.sheet().center());
         }
@@ -69,9 +75,15 @@ impl MotorForms {
     /// m' and m'' of motor k, and the derivative of m'' by p'.
     #[inline]
     pub(super) fn motor(&self, k: usize, first: Vec2, second: Vec2) -> (f64, f64, Vec2) {
-        let (j, [xx, xy, yy]) = (self.linear[k], self.quadratic[k]);
-        let half = Vec2::new(xx * first.x + xy * first.y, xy * first.x + yy * first.y);
+        let (j, half) = (self.linear[k], self.half(k, first));
         (j.dot(first), j.dot(second) + half.dot(first), 2.0 * half)
+    }
+
+    /// The product of a motor's second derivatives by the position and a vector.
+    #[inline]
+    pub(super) fn half(&self, k: usize, vector: Vec2) -> Vec2 {
+        let [xx, xy, yy] = self.quadratic[k];
+        Vec2::new(xx * vector.x + xy * vector.y, xy * vector.x + yy * vector.y)
     }
 }
 

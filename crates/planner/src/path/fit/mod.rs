@@ -7,7 +7,8 @@
 //!
 //! 1. `samples`: all vertices after simplification, and points between them.
 //! 2. `tube`: the smoothest spline whose knots stay within a radius r of the samples.
-//! 3. `joint`: from there, path and speed together, the fastest such spline.
+//! 3. `joint`: from there, path and speed together, the fastest such spline; `joint_jerk` under jerk
+//!    limits.
 //! 4. `proof`: between the knots too, spline and drawing are within r of each other in both
 //!    directions; where they are not, r is reduced at the knots around and the fit is repeated there.
 //!
@@ -21,6 +22,7 @@
 
 mod banded;
 mod joint;
+mod joint_jerk;
 mod limits;
 mod proof;
 mod samples;
@@ -34,7 +36,7 @@ use drawing::{Line, Point, Segment, Stroke, Vec2};
 use super::{
     clean, is_regular,
     piece::{Piece, Section},
-    simplify::simplify,
+    simplify::{deviation, simplify},
     tangent::distance,
 };
 pub use limits::Limits;
@@ -49,12 +51,12 @@ const MERGE: f64 = 0.02;
 /// and simplification. The rest is the radius of the tube.
 const SIMPLIFY: f64 = 0.08;
 
-/// The radius at first, as a share of what is proved afterwards: between knots the spline bulges.
-const AT_FIRST: f64 = 0.985;
-
 /// The radius as a share of the stroke's extent, at most: within a larger one a small circle would
 /// shrink to a dot.
 const EXTENT_SHARE: f64 = 0.25;
+
+/// The same where the ends are far apart.
+const OPEN_EXTENT_SHARE: f64 = 0.4;
 
 /// Weight of `|S'''|²` next to `|S''|²`, mm².
 const THIRD: f64 = 0.05;
@@ -81,8 +83,8 @@ pub enum Aim {
     Fastest,
     /// The smoothest path.
     Smoothest,
-    /// The fastest path, with `½ ∫|S'''|²` times this many s mm³ added to its time.
-    FastAndSmooth(f64),
+    /// The fastest path under jerk limits.
+    FastestUnderJerk,
 }
 
 /// The stroke as a spline within `tolerance` mm; `None` for strokes that are one line or a dot, and
@@ -90,12 +92,16 @@ pub enum Aim {
 pub fn fitted(stroke: &Stroke, limits: &Limits<'_>, tolerance: f64, aim: Aim) -> Option<Section> {
     let all_regular = stroke.segments().all(|segment| is_regular(&segment));
     let chord = if all_regular { 0.0 } else { CHORD * tolerance };
-    let pieces = merge(clean(stroke, if all_regular { 1.0 } else { chord }), MERGE * tolerance);
-    let pieces = simplify(pieces, SIMPLIFY * tolerance);
+    let cleaned = clean(stroke, if all_regular { 1.0 } else { chord });
+    let all = cleaned.len();
+    let merged = merge(cleaned, MERGE * tolerance);
+    let moved = if merged.len() == all { 0.0 } else { MERGE * tolerance };
+    let pieces = simplify(&merged, SIMPLIFY * tolerance);
     if matches!(pieces[..], [] | [Segment::Line(_)]) {
         return None;
     }
-    let radius = tolerance - (MERGE + SIMPLIFY) * tolerance - chord;
+    // What was not needed so far makes corners faster.
+    let radius = tolerance - moved - deviation(&merged, &pieces) - chord;
     let grading = if aim == Aim::Fastest { Grading::FAST } else { Grading::SMOOTH };
     Fit::new(Samples::of(&pieces, tolerance, grading), radius)?.run(limits, aim)
 }
@@ -157,10 +163,13 @@ impl Fit {
         if samples.points.windows(2).any(|pair| pair[0] == pair[1]) {
             return None;
         }
-        let bound = radius.min(EXTENT_SHARE * samples.extent());
+        let (first, last) = (samples.points[0], samples.points[samples.points.len() - 1]);
+        let extent = samples.extent();
+        let share = if distance(first, last) > 0.5 * extent { OPEN_EXTENT_SHARE } else { EXTENT_SHARE };
+        let bound = radius.min(share * extent);
         let spline = Spline::through(&samples.points);
         let energy = Energy::new(&spline, 1.0, THIRD);
-        let radii = vec![AT_FIRST * bound; samples.points.len()];
+        let radii = vec![bound; samples.points.len()];
         Some(Self { samples, spline, bound, radii, energy })
     }
 
@@ -204,23 +213,30 @@ impl Fit {
     /// Fits the knots of the blocks.
     fn fit(&mut self, limits: &Limits<'_>, aim: Aim, blocks: &[Range<usize>]) -> Option<()> {
         let Self { samples, spline, radii, energy, .. } = self;
-        let steps = if aim == Aim::Smoothest { STEPS_ALONE } else { STEPS_BEFORE_JOINT };
+        let steps = if aim == Aim::Fastest { STEPS_BEFORE_JOINT } else { STEPS_ALONE };
         let mut work = tube::Workspace::default();
         for block in blocks {
             tube::smooth(spline, &samples.points, radii, energy, block.clone(), steps, &mut work);
         }
-        let smoothing = match aim {
-            Aim::Smoothest => return Some(()),
-            Aim::Fastest => None,
-            Aim::FastAndSmooth(weight) => Some(Energy::new(spline, 0.0, weight)),
-        };
-        let problem =
-            joint::Problem { limits, samples: &samples.points, radii, smoothing: smoothing.as_ref() };
-        let mut b = problem.gentle_speeds(spline)?;
-        let mut work = joint::Workspace::default();
-        for block in blocks {
-            // Where no start is feasible the smoothest path is kept.
-            let _: Option<()> = problem.minimize(spline, &mut b, block, &mut work);
+        // Where no start is feasible the smoothest path is kept.
+        match aim {
+            Aim::Smoothest => {}
+            Aim::Fastest => {
+                let problem = joint::Problem { limits, samples: &samples.points, radii };
+                let mut b = problem.gentle_speeds(spline)?;
+                let mut work = joint::Workspace::default();
+                for block in blocks {
+                    let _: Option<()> = problem.minimize(spline, &mut b, block, &mut work);
+                }
+            }
+            Aim::FastestUnderJerk => {
+                let problem = joint_jerk::Problem { limits, samples: &samples.points, radii };
+                let mut work = joint_jerk::Workspace::default();
+                let Some(mut z) = problem.gentle_speeds(spline, &mut work) else { return Some(()) };
+                for block in blocks {
+                    let _: Option<()> = problem.minimize(spline, &mut z, block, &mut work);
+                }
+            }
         }
         Some(())
     }
