@@ -29,7 +29,7 @@ fn optimum(machine: &str, stroke: &str, build_up_ms: u32) -> Option<f64> {
 }
 
 /// Strokes of a machine for which the table has an optimum, at least.
-const LEAST_STROKES: usize = 17;
+const LEAST_STROKES: usize = 31;
 
 /// Ratios of drawing times to the optima with this build-up of the acceleration: at most `median` and
 /// `worst` for each machine.

@@ -13,8 +13,8 @@ use drawing::{Drawing, Pen, Point, Span, Stroke};
 use kinematics::{Machine, MotorPos};
 use planner::{Settings, plan};
 use serde_json::{Value, json};
-use test_support::machines::with_jerk;
 use test_support::band::{Setup, TOLERANCE_MM, setups, strokes};
+use test_support::machines::with_jerk;
 
 /// Times in which the motors build up their acceleration, ms; 0 without a jerk limit.
 const BUILD_UPS_MS: [u32; 3] = [0, 20, 100];
