@@ -70,7 +70,7 @@ impl Problem {
     fn with_plan(mut self) -> Result<Value> {
         let stroke = Stroke::polyline(Pen(1), self.points, Span::default()).context("a stroke of points")?;
         let settings = Settings::new(TOLERANCE_MM, 1000);
-        let trajectory = plan(&self.machine, Drawing { strokes: vec![stroke] }, &settings)?;
+        let trajectory = plan(&self.machine, Drawing::from(vec![stroke]), &settings)?;
         let rows = trajectory.rows().filter(|row| row.row.pen != 0);
         let places =
             rows.map(|row| self.machine.forward_from_motors(&MotorPos::new(row.exact[0], row.exact[1])));
