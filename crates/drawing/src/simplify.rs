@@ -74,11 +74,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn vertices_on_a_line_are_dropped_and_corners_kept() {
+    fn vertices_on_a_line_and_repeated_ones_are_dropped_and_corners_kept() {
         let points =
             [(0.0, 0.0), (1.0, 0.01), (2.0, 0.0), (2.0, 1.0), (2.0, 1.0), (2.0, 0.5)].map(Point::from);
-        assert_eq!(kept_vertices(&points, 0.05), [0, 2, 3, 4, 5]);
-        assert_eq!(kept_vertices(&points, 0.0), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(kept_vertices(&points, 0.05), [0, 2, 3, 5]);
+        assert_eq!(kept_vertices(&points, 0.0), [0, 1, 2, 3, 5]);
         assert_eq!(kept_vertices(&points[..1], 0.05), [0]);
         assert_eq!(kept_vertices(&[], 0.05), [0_usize; 0]);
     }

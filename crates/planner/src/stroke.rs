@@ -8,7 +8,8 @@ use crate::{
     error::PlanError,
     joint_path::{JointPath, PathGeometry},
     path::{
-        Limits, PathBudget, Piece, Section, bound_speed, fitted, sections, shortest_length, vertex_to_vertex,
+        Aim, Limits, PathBudget, Piece, Section, bound_speed, fitted, sections, shortest_length,
+        vertex_to_vertex,
     },
     settings::{Settings, TimingLaw, ToleranceBudget},
     time_parametrization::{Profile, SpeedCap, fixed_duration, profile, without_jerk},
@@ -162,8 +163,14 @@ impl StrokePlanner<'_> {
 
     /// The stroke as one spline; `None` where there is none within the tolerance and the reach.
     fn spline(&self, stroke: &Stroke, start: JointPos) -> Option<Lifted> {
+        [false, true]
+            .into_iter()
+            .find_map(|cautious| self.spline_by(stroke, start, self.budget.aim, cautious))
+    }
+
+    fn spline_by(&self, stroke: &Stroke, start: JointPos, aim: Aim, cautious: bool) -> Option<Lifted> {
         let limits = Limits::new(self.machine, self.settings.speed_of(self.machine, stroke.pen));
-        let mut section = fitted(stroke, &limits, self.budget.spline_mm?, self.budget.aim)?;
+        let mut section = fitted(stroke, &limits, self.budget.spline_mm?, aim, cautious)?;
         let row = self.budget.path.row_mm;
         if row.is_finite() {
             section =
@@ -191,22 +198,37 @@ impl StrokePlanner<'_> {
     /// these limits decide, unless they are nearly the same, or rows limit the speed near corners.
     fn faster_under_jerk(&self, stroke: &Stroke, start: JointPos, blended: Lifted) -> PlannedStroke {
         let blends = |blended| PlannedStroke { has_blends: true, ..self.planned(stroke, start, blended) };
-        let Some(spline) = self.spline(stroke, start) else { return blends(blended) };
+        // On some strokes the steps of the joint fit end far from its optimum, and the smoothest path is faster.
+        let smoothest = (self.budget.aim != Aim::Smoothest)
+            .then(|| self.spline_by(stroke, start, Aim::Smoothest, false))
+            .flatten();
+        let mut splines = self.spline(stroke, start).into_iter().chain(smoothest);
+        let Some(spline) = splines.next() else { return blends(blended) };
+        let other = splines.next();
+        let faster =
+            |a: PlannedStroke, b: PlannedStroke| if b.duration_key() < a.duration_key() { b } else { a };
+        let along = |spline: Lifted, other: Option<Lifted>| {
+            let spline = self.planned(stroke, start, spline);
+            match other {
+                Some(other) => faster(spline, self.planned(stroke, start, other)),
+                None => spline,
+            }
+        };
         if !self.budget.path.row_mm.is_finite() {
             let cap = self.cap(self.settings.speed_of(self.machine, stroke.pen));
             let rough = |paths: &Lifted| {
                 paths.iter().map(|(path, _)| without_jerk(self.machine, path, &cap).duration_s).sum::<f64>()
             };
-            let ratio = rough(&spline) / rough(&blended);
+            let least = rough(&spline).min(other.as_ref().map_or(f64::INFINITY, rough));
+            let ratio = least / rough(&blended);
             if ratio < CLEARLY_FASTER {
-                return self.planned(stroke, start, spline);
+                return along(spline, other);
             }
             if ratio > CLEARLY_SLOWER {
                 return blends(blended);
             }
         }
-        let (blends, spline) = (blends(blended), self.planned(stroke, start, spline));
-        if spline.duration_key() < blends.duration_key() { spline } else { blends }
+        faster(blends(blended), along(spline, other))
     }
 
     fn has_jerk(&self) -> bool {

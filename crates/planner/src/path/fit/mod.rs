@@ -51,6 +51,9 @@ const MERGE: f64 = 0.02;
 /// and simplification. The rest is the radius of the tube.
 const SIMPLIFY: f64 = 0.08;
 
+/// The cautious radius at first, as a share of what is proved afterwards: between knots the spline bulges.
+const CAUTIOUS: f64 = 0.985;
+
 /// The radius as a share of the stroke's extent, at most: within a larger one a small circle would
 /// shrink to a dot.
 const EXTENT_SHARE: f64 = 0.25;
@@ -89,7 +92,16 @@ pub enum Aim {
 
 /// The stroke as a spline within `tolerance` mm; `None` for strokes that are one line or a dot, and
 /// where no spline is found: outside the reach, or if the radius would become too small.
-pub fn fitted(stroke: &Stroke, limits: &Limits<'_>, tolerance: f64, aim: Aim) -> Option<Section> {
+///
+/// `cautious` takes fewer samples and a smaller radius, for strokes where the proof fails or the spline leaves
+/// the reach.
+pub fn fitted(
+    stroke: &Stroke,
+    limits: &Limits<'_>,
+    tolerance: f64,
+    aim: Aim,
+    cautious: bool,
+) -> Option<Section> {
     let all_regular = stroke.segments().all(|segment| is_regular(&segment));
     let chord = if all_regular { 0.0 } else { CHORD * tolerance };
     let cleaned = clean(stroke, if all_regular { 1.0 } else { chord });
@@ -103,7 +115,12 @@ pub fn fitted(stroke: &Stroke, limits: &Limits<'_>, tolerance: f64, aim: Aim) ->
     // What was not needed so far makes corners faster.
     let radius = tolerance - moved - deviation(&merged, &pieces) - chord;
     let grading = if aim == Aim::Fastest { Grading::FAST } else { Grading::SMOOTH };
-    Fit::new(Samples::of(&pieces, tolerance, grading), radius)?.run(limits, aim)
+    if cautious {
+        let radius = tolerance - (MERGE + SIMPLIFY) * tolerance - chord;
+        let samples = Samples::of(&pieces, tolerance, grading.without_corners());
+        return Fit::new(samples, radius, CAUTIOUS)?.run(limits, aim);
+    }
+    Fit::new(Samples::of(&pieces, tolerance, grading), radius, 1.0)?.run(limits, aim)
 }
 
 /// Removes vertices of sequences of lines that are within half of `least` of the last one kept; the
@@ -159,7 +176,8 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(samples: Samples, radius: f64) -> Option<Self> {
+    /// `at_first` is the radius of the first round as a share of what is proved.
+    fn new(samples: Samples, radius: f64, at_first: f64) -> Option<Self> {
         if samples.points.windows(2).any(|pair| pair[0] == pair[1]) {
             return None;
         }
@@ -169,7 +187,7 @@ impl Fit {
         let bound = radius.min(share * extent);
         let spline = Spline::through(&samples.points);
         let energy = Energy::new(&spline, 1.0, THIRD);
-        let radii = vec![bound; samples.points.len()];
+        let radii = vec![at_first * bound; samples.points.len()];
         Some(Self { samples, spline, bound, radii, energy })
     }
 
@@ -241,7 +259,8 @@ impl Fit {
         Some(())
     }
 
-    /// The spans around the blocks that are not within the bound, and by which distance.
+    /// The spans around the blocks that are not within the bound, or whose ends are not within it of their
+    /// samples, and by which distance.
     fn failures(&self, blocks: &[Range<usize>]) -> Vec<(usize, f64)> {
         let mut failures = Vec::new();
         let mut next = 0;
@@ -250,6 +269,14 @@ impl Fit {
             next = spans.end;
             failures.extend(spans.filter_map(|j| {
                 let curve = self.spline.bezier(j);
+                let ends = [(curve.p0, j), (curve.p3, j + 1)];
+                let off = ends
+                    .map(|(knot, i)| distance(knot, self.samples.points[i]))
+                    .into_iter()
+                    .fold(0.0, f64::max);
+                if off > self.bound {
+                    return Some((j, off));
+                }
                 proof::excess(&curve, j, &self.samples.spans, self.bound).map(|distance| (j, distance))
             }));
         }

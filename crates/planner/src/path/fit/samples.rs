@@ -25,6 +25,11 @@ impl Grading {
     /// Under jerk limits, where S''' matters too: a first step of 2.5 at corners takes 1 to 2 % longer,
     /// 9 samples on tiny corners 3 %.
     pub(super) const SMOOTH: Self = Self { first: 2.5, corner: 1.2, growth: 1.5, least: 17 };
+
+    /// With the same step next to all vertices.
+    pub(super) fn without_corners(self) -> Self {
+        Self { corner: self.first, ..self }
+    }
 }
 
 /// The chord error of a step on a curve, as a share of the tolerance: at 2 instead of 0.25 mm on a
@@ -159,12 +164,14 @@ mod tests {
     }
 
     #[test]
-    fn short_strokes_have_nine_samples() {
+    fn short_strokes_have_at_least_nine_samples() {
         let line = |a: (f64, f64), b: (f64, f64)| Segment::Line(Line::new(Point::from(a), Point::from(b)));
         let samples =
             Samples::of(&[line((0.0, 0.0), (0.1, 0.0)), line((0.1, 0.0), (0.1, 0.2))], 0.1, Grading::FAST);
-        assert_eq!(samples.points.len(), 9);
-        assert_eq!(samples.spans.len(), 8);
+        assert_eq!(samples.points.len(), 13);
+        assert_eq!(samples.spans.len(), 12);
+        let straight = Samples::of(&[line((0.0, 0.0), (0.1, 0.0))], 0.1, Grading::FAST);
+        assert_eq!(straight.points.len(), 9);
         assert!((samples.extent() - 0.2).abs() < 1e-12);
     }
 }

@@ -64,7 +64,7 @@ proptest! {
         let limits = Limits::new(&machine, 60.0);
         let tolerance = libm::pow(10.0, exponent);
         let aim = if smooth { Aim::Smoothest } else { Aim::Fastest };
-        let Some(section) = fitted(&stroke, &limits, tolerance, aim) else { return Ok(()) };
+        let Some(section) = fitted(&stroke, &limits, tolerance, aim, false) else { return Ok(()) };
         let path = chain(section.iter().map(|piece| piece.curve), 8);
         let drawn = chain(stroke.segments(), 40);
         let least = 1.001 * tolerance + 1e-9;
@@ -101,7 +101,7 @@ fn fit_of_arcs_and_cubics_stays_within_tolerance() {
         stroke.transform(drawing::Affine::translate(center.to_vec2()));
         let limits = Limits::new(&machine, 60.0);
         for tolerance in [0.1, 0.01] {
-            let section = fitted(&stroke, &limits, tolerance, Aim::Fastest).expect("a spline");
+            let section = fitted(&stroke, &limits, tolerance, Aim::Fastest, false).expect("a spline");
             let path = chain(section.iter().map(|piece| piece.curve), 8);
             let drawn = chain(stroke.segments(), 400);
             assert!(
@@ -124,7 +124,7 @@ fn lines_and_dots_are_not_fitted() {
     let limits = Limits::new(&machine, 60.0);
     for points in [vec![(1.0, 1.0)], vec![(1.0, 1.0), (5.0, 1.0)], vec![(1.0, 1.0), (3.0, 1.0), (5.0, 1.0)]] {
         let points: Vec<Point> = points.into_iter().map(Point::from).collect();
-        assert!(fitted(&polyline(&points), &limits, 0.1, Aim::Fastest).is_none());
+        assert!(fitted(&polyline(&points), &limits, 0.1, Aim::Fastest, false).is_none());
     }
 }
 
@@ -134,7 +134,7 @@ fn long_stroke_in_blocks_is_as_smooth_as_its_parts() {
     let limits = Limits::new(&machine, 60.0);
     let wave = |k: u32| Point::new(0.1 * f64::from(k), 3.0 * libm::sin(0.05 * f64::from(k)));
     let stroke = polyline(&(0..3000).map(wave).collect::<Vec<_>>());
-    let section = fitted(&stroke, &limits, 0.02, Aim::Fastest).expect("a spline");
+    let section = fitted(&stroke, &limits, 0.02, Aim::Fastest, false).expect("a spline");
     let bends = section.iter().map(|piece| {
         let (first, second) = piece.curve.derivatives(0.0);
         first.cross(second).abs() / (first.hypot() * first.hypot2())
@@ -150,7 +150,7 @@ fn small_circle_does_not_shrink_to_a_dot() {
     let limits = Limits::new(&machine, 60.0);
     let mut stroke = Stroke::new(Pen(1), Point::new(0.05, 0.0), Span::default());
     stroke.arc(EllipticArc::circular(Point::ZERO, 0.05, 0.0, std::f64::consts::TAU));
-    let section = fitted(&stroke, &limits, 0.1, Aim::Fastest).expect("a spline");
+    let section = fitted(&stroke, &limits, 0.1, Aim::Fastest, false).expect("a spline");
     let path = chain(section.iter().map(|piece| piece.curve), 8);
     let width = path.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max)
         - path.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
@@ -165,4 +165,26 @@ fn merged_vertices_move_by_less_than_the_bound() {
     let merged = merge(lines, 0.02);
     assert!(merged.len() < 30 && merged.iter().all(|line| line.length() >= 0.01), "{}", merged.len());
     assert_eq!(merged[merged.len() - 1].end(), points[99]);
+}
+
+/// The tube's barrier let the knot at the sharp turn of this stroke leave its disc by 1 %.
+#[test]
+fn knots_outside_their_discs_are_fitted_again() {
+    let points = [
+        (10.0, 10.0),
+        (10.001, 10.0),
+        (9.831_962_470_972_961, 9.656_886_810_128_954),
+        (9.926_137_294_197_707, 9.809_822_301_887_383),
+        (10.542_648_450_504_341, 9.809_822_301_887_383),
+        (10.579_402_001_599_759, 9.821_882_716_660_351),
+        (10.447_297_881_044_88, 9.323_313_187_761_489),
+        (10.754_865_404_943_07, 9.184_270_198_094_401),
+    ];
+    let stroke = polyline(&points.map(Point::from));
+    let machine = machines::corexy();
+    let tolerance = 0.017_583_124_389_724_272;
+    let section =
+        fitted(&stroke, &Limits::new(&machine, 60.0), tolerance, Aim::Fastest, false).expect("a spline");
+    let path = chain(section.iter().map(|piece| piece.curve), 64);
+    assert!(farthest(&chain(stroke.segments(), 40), &path) <= tolerance);
 }
