@@ -4,6 +4,8 @@
 //! (pieces of constant acceleration or jerk, the pen within 0.1 mm of each line at nodes and half way
 //! between them, limits of both motors), local optima found by ipopt.
 
+#![expect(clippy::print_stdout, reason = "the table of docs/planning.md is printed")]
+
 use drawing::{Drawing, Pen, Point, Span, Stroke};
 use kinematics::Machine;
 use planner::{Settings, plan};

@@ -224,11 +224,15 @@ impl Problem<'_> {
         let block = 1..count - 1;
         for _ in 0..60 {
             if self.cost(spline, &work.control, &z, &block, &spans, work).is_some() {
-                z.iter_mut().for_each(|z| *z *= 0.9);
+                for z in &mut z {
+                    *z *= 0.9;
+                }
                 work.z.clone_from(&z);
                 return Some(z);
             }
-            z.iter_mut().for_each(|z| *z *= 0.7);
+            for z in &mut z {
+                *z *= 0.7;
+            }
         }
         None
     }
@@ -519,7 +523,8 @@ impl Local {
                 let columns = [column(0), column(1), column(2)];
                 for l in 0..3 {
                     let to = 3 * l + 2;
-                    full[at.min(to)][at.max(to)] = (0..3).map(|q| columns[q] * of_z[q][l]).sum();
+                    full[at.min(to)][at.max(to)] =
+                        columns.iter().zip(of_z).map(|(column, row)| column * row[l]).sum();
                 }
                 gradient[at] = (0..3).map(|p| rows[p][k] * self.gradient[3 * axis + p]).sum();
             }
