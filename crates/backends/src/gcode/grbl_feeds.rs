@@ -64,7 +64,7 @@ impl Feeds {
         self.chords.iter().map(|chords| chords.as_deref().map_or(Route::Drawn, Route::Chords)).collect()
     }
 
-    /// Strokes that are written as chords of the plan's path; nothing if there are none.
+    /// Strokes that are written as chords of the plan's path; `None` without such strokes.
     pub(super) fn chords_line(&self) -> Option<String> {
         let (count, all) = (self.chords.iter().flatten().count(), self.chords.len());
         (count > 0).then(|| {
