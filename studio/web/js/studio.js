@@ -40,6 +40,8 @@ export class Studio {
     /** Whether the files that are opened next lie over those that are open. */
     this.adds = false;
     this.notice = element("div", { class: "notice", role: "alert" });
+    /** What the notice was made from, as JSON. */
+    this.shownNotice = "";
     this.welcome = element("div", { class: "welcome" }, element("p", {}, "Drop an HPGL, SVG or points file here, open one, or sketch on the sheet."));
     viewer.stage.append(this.welcome, this.notice);
     this.openTab = tabs(byId("setup-tabs"), (id) => {
@@ -322,6 +324,11 @@ export class Studio {
     this.editor.showProblems(problems.filter((problem) => problem.about === "machine"));
     const wrong = new Set(problems.map((problem) => problem.option));
     for (const [id, option] of FIELDS) byId(id).setAttribute("aria-invalid", String(wrong.has(option.replaceAll("_", "-"))));
+    // A press of a button in the notice takes the focus from a field, which plans again: the button
+    // that is being pressed stays while the notice would say the same.
+    const shown = JSON.stringify([problems, this.outline !== null]);
+    if (shown === this.shownNotice) return;
+    this.shownNotice = shown;
     const items = problems.map((problem) => {
       const where = problem.about === "machine" ? `Machine file${problem.line ? `, line ${problem.line}` : ""}: ` : "";
       const box = element("div", { class: "problem" }, element("b", {}, `${where}${problem.message}`));
