@@ -39,7 +39,7 @@ mod seam;
 mod search;
 mod touch;
 
-use drawing::{Drawing, Pen, Point, Stroke};
+use drawing::{Drawing, Pen, Point, Stroke, Strokes};
 
 pub use cost::{Cost, CostPoint};
 pub use dedupe::without_duplicates;
@@ -73,18 +73,24 @@ pub fn optimize_with_progress(
     if options.dedupe {
         pens = pens.into_iter().map(dedupe::dedupe).collect();
     }
-    let in_file_order: Vec<Stroke> = pens.iter().flatten().cloned().collect();
+    let (limit, mm_in_file_order) = report::travel(pens.iter().flatten(), cost, options);
+    // Packed: it is needed again only if the search finds nothing better.
+    let mut in_file_order = Strokes::default();
+    pens.iter().flatten().for_each(|stroke| in_file_order.push(stroke));
     let strokes_without_duplicates = in_file_order.len();
     if options.merge {
         pens = pens.into_iter().map(|strokes| merge::merge(strokes, options.keep_direction)).collect();
     }
     let ordered = search_each_pen(pens, cost, options, Progress::new(progress));
 
-    let (limit, _) = report::travel(&in_file_order, cost, options);
-    let (found, _) = report::travel(&ordered, cost, options);
+    let (found, found_mm) = report::travel(&ordered, cost, options);
     // With NaN the comparison is false and file order is kept. A rounding error must not decide.
-    let strokes = if found <= limit + 1e-9 * limit { ordered } else { in_file_order };
-    let (travel_cost_after, travel_mm_after) = report::travel(&strokes, cost, options);
+    let (strokes, travel_cost_after, travel_mm_after) = if found <= limit + 1e-9 * limit {
+        drop(in_file_order);
+        (Strokes::from(ordered), found, found_mm)
+    } else {
+        (in_file_order, limit, mm_in_file_order)
+    };
     let report = Report {
         strokes_before,
         strokes_after: strokes.len(),
@@ -95,7 +101,7 @@ pub fn optimize_with_progress(
         travel_mm_before,
         travel_mm_after,
     };
-    (Drawing::from(strokes), report)
+    (Drawing { strokes }, report)
 }
 
 /// The strokes of each pen in file order; pens as in `pen_order`, then by their first stroke.

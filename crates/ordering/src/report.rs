@@ -27,7 +27,11 @@ pub struct Report {
 }
 
 /// The travel of strokes in this order: in the unit of the cost, and in mm.
-pub(crate) fn travel(strokes: &[Stroke], cost: &dyn Cost, options: &Options) -> (f64, f64) {
+pub(crate) fn travel<'a>(
+    strokes: impl IntoIterator<Item = &'a Stroke>,
+    cost: &dyn Cost,
+    options: &Options,
+) -> (f64, f64) {
     let mut from = options.start;
     let mut total = (0.0, 0.0);
     let mut go = |from: Option<Point>, to: Option<Point>| {
@@ -35,11 +39,13 @@ pub(crate) fn travel(strokes: &[Stroke], cost: &dyn Cost, options: &Options) -> 
             total = (total.0 + cost.between(from, to), total.1 + distance(from, to));
         }
     };
+    let mut is_empty = true;
     for stroke in strokes {
         go(from, Some(stroke.start()));
         from = Some(stroke.end());
+        is_empty = false;
     }
-    if !strokes.is_empty() {
+    if !is_empty {
         go(from, options.park);
     }
     total

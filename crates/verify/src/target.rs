@@ -182,14 +182,19 @@ struct BoxTree {
 }
 
 impl BoxTree {
-    /// Of at least one line.
-    fn new(lines: &[[Point; 2]]) -> Self {
-        let boxes: Vec<Rect> = lines.iter().map(|[from, to]| Rect::from_points(*from, *to)).collect();
-        let order = by_position(&boxes);
-        let mut levels: Vec<Vec<Rect>> = Vec::new();
+    /// Of `count` lines, at least one; `line` returns the ends of each. It is asked for them several times
+    /// instead of keeping them: copies would take more memory than the tree.
+    fn new(count: usize, line: impl Fn(u32) -> [Point; 2]) -> Self {
+        let bounds = |index: u32| {
+            let [from, to] = line(index);
+            Rect::from_points(from, to)
+        };
+        let order = by_position(count, bounds);
         let union = |boxes: &[Rect]| boxes[1..].iter().fold(boxes[0], |sum, next| sum.union(*next));
-        let bounds = |chunk: &[u32]| chunk.iter().map(|i| boxes[*i as usize]).collect::<Vec<_>>();
-        let mut level: Vec<Rect> = order.chunks(FAN).map(|chunk| union(&bounds(chunk))).collect();
+        let of_lines =
+            |chunk: &[u32]| chunk[1..].iter().fold(bounds(chunk[0]), |sum, next| sum.union(bounds(*next)));
+        let mut levels: Vec<Vec<Rect>> = Vec::new();
+        let mut level: Vec<Rect> = order.chunks(FAN).map(of_lines).collect();
         while level.len() > 1 {
             let next = level.chunks(FAN).map(union).collect();
             levels.push(std::mem::replace(&mut level, next));
@@ -198,7 +203,7 @@ impl BoxTree {
         levels.push(level);
         let largest = [all.x0, all.y0, all.x1, all.y1].into_iter().fold(0.0_f64, |sum, c| sum.max(c.abs()));
         Self {
-            lines: order.iter().map(|i| Line::new(lines[*i as usize])).collect(),
+            lines: order.iter().map(|index| Line::new(line(*index))).collect(),
             rounding: largest * f64::from(f32::EPSILON),
             order,
             levels,
@@ -233,7 +238,7 @@ impl BoxTree {
 
 impl PenTarget {
     fn new(pen: u16, pieces: Vec<Piece>) -> Self {
-        let all = BoxTree::new(&pieces.iter().map(Piece::ends).collect::<Vec<_>>());
+        let all = BoxTree::new(pieces.len(), |index| pieces[index as usize].ends());
         let stroke = |index: usize| pieces.get(index).map(|piece| piece.stroke);
         let mut ends = Vec::new();
         for (index, piece) in pieces.iter().enumerate() {
@@ -244,7 +249,7 @@ impl PenTarget {
                 ends.push((piece.at(piece.length), index as u32));
             }
         }
-        let ends_tree = BoxTree::new(&ends.iter().map(|(end, _)| [*end, *end]).collect::<Vec<_>>());
+        let ends_tree = BoxTree::new(ends.len(), |index| [ends[index as usize].0; 2]);
         Self { pen, pieces, all, ends, ends_tree }
     }
 
@@ -309,11 +314,10 @@ impl PenTarget {
     }
 }
 
-/// The items along a Morton (Z-order) curve through the middles of their boxes, so that neighbours
-/// share boxes.
-fn by_position(boxes: &[Rect]) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let Some(all) = boxes.iter().copied().reduce(|a, b| a.union(b)) else { return order };
+/// The numbers below `count` along a Morton (Z-order) curve through the middles of their boxes, so that
+/// neighbours share boxes.
+fn by_position(count: usize, bounds: impl Fn(u32) -> Rect) -> Vec<u32> {
+    let Some(all) = (0..count as u32).map(&bounds).reduce(|a, b| a.union(b)) else { return Vec::new() };
     let scale = 65535.0 / all.width().max(all.height()).max(f64::MIN_POSITIVE);
     let spread = |value: f64| {
         let mut bits = u64::from(value as u16);
@@ -322,11 +326,16 @@ fn by_position(boxes: &[Rect]) -> Vec<u32> {
         bits = (bits | bits << 2) & 0x3333_3333;
         (bits | bits << 1) & 0x5555_5555
     };
-    order.sort_by_cached_key(|i| {
-        let middle = boxes[*i as usize].center();
-        spread((middle.x - all.x0) * scale) | spread((middle.y - all.y0) * scale) << 1
-    });
-    order
+    // The place on the curve above the number, so that equal places stay in the order of their numbers.
+    let mut order: Vec<u64> = (0..count as u32)
+        .map(|index| {
+            let middle = bounds(index).center();
+            let place = spread((middle.x - all.x0) * scale) | spread((middle.y - all.y0) * scale) << 1;
+            place << 32 | u64::from(index)
+        })
+        .collect();
+    order.sort_unstable();
+    order.into_iter().map(|item| item as u32).collect()
 }
 
 /// The whole drawing.
@@ -452,7 +461,7 @@ mod tests {
                 .collect();
             let bounds = Rect::new(x + offset, y, x + width + offset, y + height);
             let mut found = Vec::new();
-            BoxTree::new(&lines).visit(bounds, |_, index| found.push(index as usize));
+            BoxTree::new(lines.len(), |index| lines[index as usize]).visit(bounds, |_, index| found.push(index as usize));
             found.sort_unstable();
             let slack = 4.0 * (offset + 12.0) * f64::from(f32::EPSILON);
             for (index, [from, to]) in lines.iter().enumerate() {

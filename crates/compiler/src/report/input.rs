@@ -1,6 +1,6 @@
 //! Drawings and plans that were read.
 
-use drawing::{Drawing, Rect};
+use drawing::{Figures, Pen, Rect};
 use schemars::JsonSchema;
 use serde::Serialize;
 use verify::Certificate;
@@ -65,24 +65,34 @@ pub struct PenReport {
 impl DrawingReport {
     /// The report of a file.
     pub fn of(document: &Document) -> Self {
+        let figures: Vec<Figures> = document.pages.iter().map(|page| page.drawing.figures()).collect();
+        Self::with_figures(document, &figures)
+    }
+
+    /// The report of a file; `figures` are those of the drawings of its pages.
+    pub fn with_figures(document: &Document, figures: &[Figures]) -> Self {
         let fact = |Fact { key, value }: &Fact| FactReport { key: (*key).to_owned(), value: value.clone() };
         Self {
             format: document.format.to_owned(),
             facts: document.facts.iter().map(fact).collect(),
-            pages: document.pages.iter().map(PageReport::of).collect(),
+            pages: document
+                .pages
+                .iter()
+                .zip(figures)
+                .map(|(page, figures)| PageReport::of(page, figures))
+                .collect(),
         }
     }
 }
 
 impl PageReport {
-    fn of(page: &Page) -> Self {
-        let drawing = &page.drawing;
+    fn of(page: &Page, figures: &Figures) -> Self {
         Self {
-            strokes: drawing.strokes.len(),
-            dots: drawing.strokes.iter().filter(drawing::Stroke::is_dot).count(),
-            ink_mm: round::mm(drawing.length()),
-            bounds_mm: drawing.bounding_box().map(corners),
-            pens: drawing.pens().into_iter().map(|pen| PenReport::of(page, drawing, pen)).collect(),
+            strokes: page.drawing.strokes.len(),
+            dots: figures.dots,
+            ink_mm: round::mm(figures.length_mm),
+            bounds_mm: figures.bounds.map(corners),
+            pens: figures.pens.iter().map(|(pen, of_pen)| PenReport::of(page, *pen, *of_pen)).collect(),
         }
     }
 }
@@ -93,9 +103,7 @@ pub(super) fn corners(rect: Rect) -> [f64; 4] {
 }
 
 impl PenReport {
-    fn of(page: &Page, drawing: &Drawing, pen: drawing::Pen) -> Self {
-        let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
-        let (strokes, ink_mm) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
+    fn of(page: &Page, pen: Pen, (strokes, ink_mm): (usize, f64)) -> Self {
         let settings = page.pens.get(&pen).cloned().unwrap_or_default();
         Self {
             pen: pen.0,

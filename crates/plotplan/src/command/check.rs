@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use compiler::pipeline::{self, Target};
 use compiler::report::text::{length, pluralize};
 use compiler::report::{Code, DrawingReport, MachineReport};
+use drawing::Figures;
 use kinematics::Machine;
 
 use super::convert::{self, clean};
@@ -28,25 +29,25 @@ pub(crate) fn run(arguments: &Check) -> Result<(), Failure> {
         drawn.crop(arguments.reading.layout.crop);
     }
     let document = &drawn.document;
-    session::report(|report| report.drawing = Some(DrawingReport::of(document)));
+    let figures: Vec<Figures> = document.pages.iter().map(|page| page.drawing.figures()).collect();
+    session::report(|report| report.drawing = Some(DrawingReport::with_figures(document, &figures)));
     let mut text = format!("{}: {}\n", input.path, document.size);
-    for (number, page) in document.pages.iter().enumerate() {
-        let drawing = &page.drawing;
+    for (number, (page, figures)) in document.pages.iter().zip(&figures).enumerate() {
         if document.pages.len() > 1 {
             let _ = write!(text, "page {}: ", number + 1);
         }
-        match drawing.bounding_box() {
+        match figures.bounds {
             Some(bounds) => {
                 let _ = writeln!(
                     text,
                     "{}, {} of ink from {:.2}, {:.2} to {:.2}, {:.2} mm, pens {}",
-                    pluralize(drawing.strokes.len(), "stroke"),
-                    length(drawing.length()),
+                    pluralize(page.drawing.strokes.len(), "stroke"),
+                    length(figures.length_mm),
                     bounds.x0,
                     bounds.y0,
                     bounds.x1,
                     bounds.y1,
-                    drawing.pens().iter().map(|pen| pen.0.to_string()).collect::<Vec<_>>().join(", ")
+                    figures.pens.keys().map(|pen| pen.0.to_string()).collect::<Vec<_>>().join(", ")
                 );
             }
             None => text.push_str("no ink\n"),

@@ -9,7 +9,7 @@ use compiler::pipeline::Target;
 use compiler::replay;
 use compiler::report::text::{self, duration, length, pluralize};
 use compiler::report::{CertificateReport, DrawingReport, PlanReport, ProgramReport, Summary};
-use drawing::Rect;
+use drawing::{Figures, Rect};
 use kinematics::Machine;
 
 use super::convert::{self, clean};
@@ -48,23 +48,23 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<(), Failure> {
         drawn.crop(arguments.reading.layout.crop);
     }
     let document = &drawn.document;
-    session::report(|report| report.drawing = Some(DrawingReport::of(document)));
+    let figures: Vec<Figures> = document.pages.iter().map(|page| page.drawing.figures()).collect();
+    session::report(|report| report.drawing = Some(DrawingReport::with_figures(document, &figures)));
     let mut text = format!("drawing  {}\n", input.path);
     for Fact { key, value } in &document.facts {
         let _ = writeln!(text, "{key:<8} {}", value.replace('\n', "\n         "));
     }
-    for (number, page) in document.pages.iter().enumerate() {
-        let drawing = &page.drawing;
+    for (number, (page, figures)) in document.pages.iter().zip(&figures).enumerate() {
         if document.pages.len() > 1 {
             let _ = writeln!(text, "page     {}", number + 1);
         }
-        let Some(bounds) = drawing.bounding_box() else {
+        let Some(bounds) = figures.bounds else {
             text.push_str("ink      none\n");
             continue;
         };
-        let dots = drawing.strokes.iter().filter(drawing::Stroke::is_dot).count();
-        let _ = writeln!(text, "strokes  {} ({})", drawing.strokes.len(), pluralize(dots, "dot"));
-        let _ = writeln!(text, "ink      {}", length(drawing.length()));
+        let dots = pluralize(figures.dots, "dot");
+        let _ = writeln!(text, "strokes  {} ({dots})", page.drawing.strokes.len());
+        let _ = writeln!(text, "ink      {}", length(figures.length_mm));
         let _ = writeln!(
             text,
             "bounds   {:.2}, {:.2} to {:.2}, {:.2} mm ({:.2} x {:.2})",
@@ -75,10 +75,8 @@ fn of_drawing(inputs: &Inputs, arguments: &Info) -> Result<(), Failure> {
             bounds.width(),
             bounds.height()
         );
-        for pen in drawing.pens() {
-            let mine = drawing.strokes.iter().filter(|stroke| stroke.pen == pen);
-            let (count, ink_mm) = mine.fold((0, 0.0), |(n, l), stroke| (n + 1, l + stroke.length()));
-            let settings = page.pens.get(&pen).cloned().unwrap_or_default();
+        for (pen, &(count, ink_mm)) in &figures.pens {
+            let settings = page.pens.get(pen).cloned().unwrap_or_default();
             let mut own = String::new();
             if let Some(speed) = settings.speed_mm_s {
                 let _ = write!(own, ", {speed:.0} mm/s");
