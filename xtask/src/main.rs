@@ -70,7 +70,9 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bench throughput [PROGRAM]
                 CPU time of drawings of more than a megabyte by step, beside that of commit 5e26b6c or
                 of PROGRAM
-  bench large   CPU time and memory of plans of 1, 10 and 100 MB of text: half an hour
+  bench large [PROGRAM]
+                CPU time and memory of plans of 1, 10 and 100 MB of text by PROGRAM or the released
+                program: half an hour
   bench place   what the search for the best place gains on the examples
   bench simulate
       speed of simulations and of a search of gains
@@ -116,7 +118,8 @@ fn main() -> ExitCode {
         ["bench", "rounding", folder] => bench::rounding(Some(folder.as_ref())),
         ["bench", "throughput"] => bench::throughput(None),
         ["bench", "throughput", program] => bench::throughput(Some(program.as_ref())),
-        ["bench", "large"] => bench::large(),
+        ["bench", "large"] => bench::large(None),
+        ["bench", "large", program] => bench::large(Some(program.as_ref())),
         ["bench", "place"] => bench::place(),
         ["bench", "simulate"] => bench::simulate(),
         ["bench", "plan"] => bench::plan("python3"),

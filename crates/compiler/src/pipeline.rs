@@ -76,7 +76,7 @@ pub enum Step {
     Ordering(u64, u64),
     /// Planning motion: strokes planned, strokes in all.
     Planning(usize, usize),
-    /// Replaying the plan: rows done, rows in all.
+    /// Comparing the drawing with the ordered one and replaying the plan: work done and in all, in rows.
     Verifying(u64, u64),
 }
 
@@ -132,7 +132,11 @@ impl ordering::Cost for TravelTime<'_> {
 }
 
 /// Rows between two reports of progress.
-const PROGRESS_ROWS: u64 = 100_000;
+const PROGRESS_ROWS: u64 = 20_000;
+
+/// Reading a stroke for a comparison, or for the verifier's index, takes about the time of this number of
+/// rows.
+const STROKE_ROWS: u64 = 2;
 
 /// A drawing where it lies on the machine.
 #[derive(Clone, Debug)]
@@ -460,14 +464,23 @@ fn planned<'a>(
     // Against the drawing in the file's order, so that anything ordering lost or changed shows. Where
     // ordering provably changed only order and direction, against its result: where strokes crowd,
     // ink that follows them from end to end is measured much faster.
-    let drawn = if same_ink(placed, ordered) { ordered } else { placed };
-    let certificate = verify::certify(machine, drawn, &header, request.tolerance_mm, || {
+    let compared = (placed.strokes.len() + ordered.strokes.len()) as u64;
+    let report = |strokes: u64, rows: u64| {
+        let all = STROKE_ROWS * (compared + ordered.strokes.len() as u64) + header.rows;
+        progress(Step::Verifying((STROKE_ROWS * strokes + rows).min(all), all));
+    };
+    let is_same = same_ink(placed, ordered, &|strokes| report(strokes as u64, 0));
+    let drawn = if is_same { ordered } else { placed };
+    let rows = || {
         trajectory.rows().enumerate().map(|(done, row)| {
             if (done as u64).is_multiple_of(PROGRESS_ROWS) {
-                progress(Step::Verifying(done as u64, header.rows));
+                report(compared + ordered.strokes.len() as u64, done as u64);
             }
             (row.row, Some(row.exact))
         })
-    });
+    };
+    let indexed = |strokes| report(compared + strokes as u64, 0);
+    let certificate =
+        verify::certify_with_progress(machine, drawn, &header, request.tolerance_mm, rows, &indexed);
     Ok(Planned { trajectory, header, certificate })
 }

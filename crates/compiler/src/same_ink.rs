@@ -4,9 +4,14 @@ use std::collections::BTreeMap;
 
 use drawing::{Drawing, Point, Segment};
 
+/// Strokes between two reports of progress.
+const PROGRESS_STROKES: usize = 4096;
+
 /// Whether two drawings consist of the same pieces with the same pens, in any order and direction.
-pub(crate) fn same_ink(one: &Drawing, other: &Drawing) -> bool {
-    pieces_of(one) == pieces_of(other)
+/// `progress` is called now and then with the number of strokes read, of both drawings.
+pub(crate) fn same_ink(one: &Drawing, other: &Drawing, progress: &dyn Fn(usize)) -> bool {
+    let pieces = pieces_of(one, progress);
+    pieces == pieces_of(other, &|done| progress(one.strokes.len() + done))
 }
 
 /// A piece: its ends (the smaller first) and its middle, in nm. The middle distinguishes curves between the
@@ -45,11 +50,14 @@ fn packed([a, b, middle]: Piece) -> Option<u128> {
     Some(code)
 }
 
-/// The pieces of each pen.
-fn pieces_of(drawing: &Drawing) -> BTreeMap<u16, Pieces> {
+/// The pieces of each pen. `progress` is called with the number of strokes read.
+fn pieces_of(drawing: &Drawing, progress: &dyn Fn(usize)) -> BTreeMap<u16, Pieces> {
     let nanometres = |p: Point| [p.x, p.y].map(|mm| (mm * 1e6).round() as i64);
     let mut pens: BTreeMap<u16, Pieces> = BTreeMap::new();
-    for stroke in &drawing.strokes {
+    for (index, stroke) in drawing.strokes.iter().enumerate() {
+        if index.is_multiple_of(PROGRESS_STROKES) {
+            progress(index);
+        }
         let pieces = pens.entry(stroke.pen.0).or_default();
         let mut add = |a: Point, b: Point, middle: Point| {
             let (a, b) = (nanometres(a), nanometres(b));
@@ -125,7 +133,7 @@ mod tests {
         fn lines_are_packed(ends in prop::array::uniform4(-1000.0..1000.0)) {
             let [a, b] = [Point::new(ends[0], ends[1]), Point::new(ends[2], ends[3])];
             let stroke = Stroke::polyline(Pen(1), vec![a, b], Span::default()).unwrap();
-            let pieces = pieces_of(&Drawing::from(vec![stroke]));
+            let pieces = pieces_of(&Drawing::from(vec![stroke]), &|_| {});
             prop_assert_eq!((pieces[&1].packed.len(), pieces[&1].others.len()), (1, 0));
         }
     }
@@ -134,7 +142,7 @@ mod tests {
     fn same_ink_ignores_order_direction_and_joining() {
         let one = drawing(&[&[(0.0, 0.0), (1.0, 0.0)], &[(1.0, 0.0), (1.0, 2.0)], &[(5.0, 5.0)]]);
         let other = drawing(&[&[(5.0, 5.0)], &[(1.0, 2.0), (1.0, 0.0), (0.0, 0.0)]]);
-        assert!(same_ink(&one, &other));
+        assert!(same_ink(&one, &other, &|_| {}));
     }
 
     #[test]
@@ -145,24 +153,24 @@ mod tests {
             stroke.arc(arc);
             Drawing::from(vec![stroke])
         };
-        assert!(same_ink(&circle(2.0, 0.0), &circle(2.0, 1.0)));
-        assert!(!same_ink(&circle(2.0, 0.0), &circle(2.1, 0.0)));
+        assert!(same_ink(&circle(2.0, 0.0), &circle(2.0, 1.0), &|_| {}));
+        assert!(!same_ink(&circle(2.0, 0.0), &circle(2.1, 0.0), &|_| {}));
     }
 
     #[test]
     fn same_ink_notices_lost_moved_and_bent_pieces() {
         let one = drawing(&[&[(0.0, 0.0), (1.0, 0.0)], &[(5.0, 5.0)]]);
-        assert!(!same_ink(&one, &drawing(&[&[(0.0, 0.0), (1.0, 0.0)]])));
-        assert!(!same_ink(&one, &drawing(&[&[(0.0, 0.0), (1.0, 1e-5)], &[(5.0, 5.0)]])));
+        assert!(!same_ink(&one, &drawing(&[&[(0.0, 0.0), (1.0, 0.0)]]), &|_| {}));
+        assert!(!same_ink(&one, &drawing(&[&[(0.0, 0.0), (1.0, 1e-5)], &[(5.0, 5.0)]]), &|_| {}));
         let half = |sweep: f64| {
             let arc = EllipticArc::circular(Point::ZERO, 1.0, 0.0, sweep);
             let mut stroke = Stroke::new(Pen(1), Point::new(1.0, 0.0), Span::default());
             stroke.arc(arc);
             Drawing::from(vec![stroke])
         };
-        assert!(!same_ink(&half(std::f64::consts::PI), &half(-std::f64::consts::PI)));
+        assert!(!same_ink(&half(std::f64::consts::PI), &half(-std::f64::consts::PI), &|_| {}));
         let mut turned = half(2.0);
         turned.strokes.update(Stroke::reverse);
-        assert!(same_ink(&half(2.0), &turned));
+        assert!(same_ink(&half(2.0), &turned, &|_| {}));
     }
 }

@@ -198,7 +198,7 @@ mod tests {
         let strokes = lines
             .iter()
             .filter_map(|line| Stroke::polyline(Pen(1), line.map(Point::from).to_vec(), Span::default()));
-        let strokes = Target::new(&Drawing { strokes: strokes.collect() }, 0.1).pens.remove(0);
+        let strokes = Target::new(&Drawing { strokes: strokes.collect() }, 0.1, &|_| {}).pens.remove(0);
         let mut follower = Follower::default();
         let mut candidates: Vec<Candidate> = (0..strokes.pieces.len() as u32).map(Candidate::new).collect();
         follower.start(&strokes, Point::ZERO, RADIUS, &candidates);

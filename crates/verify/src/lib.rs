@@ -86,4 +86,4 @@ mod verifier;
 pub use certificate::{Certificate, Deviation, DeviationStats, JerkPeak, MotorPeak, QuantizationError};
 pub use failure::{Failure, Location, PenMotion, Violation};
 pub use mismatch::{Mismatch, mismatches};
-pub use verifier::{ExactRow, Timing, Verifier, certify};
+pub use verifier::{ExactRow, Timing, Verifier, certify, certify_with_progress};

@@ -25,6 +25,9 @@ const MAX_CUTS: f64 = 500_000.0;
 /// Number of cells of a piece that are examined together.
 pub(crate) const BLOCK: usize = 16;
 
+/// Strokes between two reports of progress.
+const PROGRESS_STROKES: usize = 4096;
+
 /// Number of children of a box of the tree.
 const FAN: usize = 8;
 
@@ -356,13 +359,17 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    pub(crate) fn new(drawing: &Drawing, tolerance_mm: f64) -> Self {
+    /// `indexed` is called now and then with the number of strokes read.
+    pub(crate) fn new(drawing: &Drawing, tolerance_mm: f64, indexed: &dyn Fn(usize)) -> Self {
         let flatness = tolerance_mm * FLATNESS;
         let mut by_pen: Vec<(u16, Vec<Piece>)> =
             drawing.pens().into_iter().filter(|pen| pen.0 != 0).map(|pen| (pen.0, Vec::new())).collect();
         let longest = LONGEST_PIECE.max(drawing.length() / MAX_CUTS);
         let mut broken = Vec::new();
         for (index, stroke) in drawing.strokes.iter().enumerate() {
+            if index.is_multiple_of(PROGRESS_STROKES) {
+                indexed(index);
+            }
             let Ok(slot) = by_pen.binary_search_by_key(&stroke.pen.0, |(pen, _)| *pen) else { continue };
             let pieces = &mut by_pen[slot].1;
             let first = pieces.len();

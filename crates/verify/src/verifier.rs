@@ -151,11 +151,24 @@ pub fn certify<I: Iterator<Item = ExactRow>>(
     drawing: &Drawing,
     timing: impl Into<Timing>,
     tolerance_mm: f64,
+    rows: impl FnMut() -> I,
+) -> Certificate {
+    certify_with_progress(machine, drawing, timing, tolerance_mm, rows, &|_| {})
+}
+
+/// As [`certify`]; before the rows are asked for, `indexed` is called now and then with the number of
+/// strokes of the drawing that have been read.
+pub fn certify_with_progress<I: Iterator<Item = ExactRow>>(
+    machine: &Machine,
+    drawing: &Drawing,
+    timing: impl Into<Timing>,
+    tolerance_mm: f64,
     mut rows: impl FnMut() -> I,
+    indexed: &dyn Fn(usize),
 ) -> Certificate {
     let timing = timing.into();
     let mut measure = |follows: bool| {
-        let mut verifier = Verifier::with(machine, drawing, timing, tolerance_mm, follows);
+        let mut verifier = Verifier::with(machine, drawing, timing, tolerance_mm, follows, indexed);
         rows().for_each(|(row, exact)| verifier.row(row, exact));
         verifier.finish()
     };
@@ -174,7 +187,7 @@ impl<'a> Verifier<'a> {
         timing: impl Into<Timing>,
         tolerance_mm: f64,
     ) -> Self {
-        Self::with(machine, drawing, timing.into(), tolerance_mm, false)
+        Self::with(machine, drawing, timing.into(), tolerance_mm, false, &|_| {})
     }
 
     /// With `follows`, crowded drawings are measured faster, and a failure may be wrong.
@@ -184,11 +197,12 @@ impl<'a> Verifier<'a> {
         timing: Timing,
         tolerance_mm: f64,
         follows: bool,
+        indexed: &dyn Fn(usize),
     ) -> Self {
         // Resolutions depend on the tolerance. A plan with an unusable one is still measured, but
         // cannot hold.
         let scale = if tolerance_mm > 1e-6 { tolerance_mm.min(1e3) } else { 1e-6 };
-        let target = Target::new(drawing, scale);
+        let target = Target::new(drawing, scale, indexed);
         let start = machine.motor_positions(&machine.start());
         let mut failures = Failures::default();
         for &stroke in &target.broken {

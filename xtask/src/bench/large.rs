@@ -1,9 +1,9 @@
-//! `cargo xtask bench large`: CPU time and peak memory of whole plans of 1, 10 and 100 MB of text.
+//! `cargo xtask bench large [PROGRAM]`: CPU time and peak memory of whole plans of 1, 10 and 100 MB of text.
 //!
 //! Takes more than half an hour of CPU.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -16,15 +16,10 @@ const SIZES: [usize; 3] = [1_000_000, 10_000_000, 100_000_000];
 const GROWTH: f64 = 1.05;
 const MEMORY_BYTES: f64 = 2e9;
 
-/// Plans each size with the released program and prints a table; true if every goal is met.
-pub(super) fn run() -> Result<bool> {
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--release", "--package", "plotplan"])
-        .current_dir(crate::top())
-        .status()
-        .context("cannot run cargo")?;
-    anyhow::ensure!(built.success(), "plotplan does not build");
-    let program = crate::top().join("target/release/plotplan");
+/// Plans each size with `program`, by default the released one, and prints a table; true if every goal is
+/// met.
+pub(super) fn run(program: Option<&Path>) -> Result<bool> {
+    let program = program.map_or_else(released, |program| Ok(std::path::absolute(program)?))?;
     let work = tempfile::tempdir()?;
     let mut first: Option<f64> = None;
     let mut met = true;
@@ -47,6 +42,17 @@ pub(super) fn run() -> Result<bool> {
         std::io::stdout().flush()?;
     }
     Ok(met)
+}
+
+/// The released program, built.
+fn released() -> Result<PathBuf> {
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--quiet", "--release", "--package", "plotplan"])
+        .current_dir(crate::top())
+        .status()
+        .context("cannot run cargo")?;
+    anyhow::ensure!(built.success(), "plotplan does not build");
+    Ok(crate::top().join("target/release/plotplan"))
 }
 
 /// CPU time, s, and peak memory, bytes, of one plan.

@@ -39,8 +39,8 @@ pub(crate) fn simulate() -> Result<bool> {
 }
 
 /// `bench large`; true if all goals were met.
-pub(crate) fn large() -> Result<bool> {
-    large::run()
+pub(crate) fn large(program: Option<&Path>) -> Result<bool> {
+    large::run(program)
 }
 
 /// `bench place`; true if all goals were met.
