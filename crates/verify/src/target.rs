@@ -405,12 +405,17 @@ impl Target {
             .map(|(pen, pieces)| PenTarget::new(pen, pieces))
             .collect();
         let (mut cells, mut blocks) = (0, 0);
-        for piece in pens.iter_mut().flat_map(|pen| &mut pen.pieces) {
-            piece.first_cell = cells;
-            piece.cells = (piece.length / cell).ceil().max(1.0) as u32;
-            cells += piece.cells;
-            piece.first_block = blocks;
-            blocks += piece.cells.div_ceil(BLOCK as u32);
+        for pen in &mut pens {
+            // In the order of the tree: a run reads and writes the cells of pieces that lie close to each other,
+            // which then do so in memory too. The cells of a piece stay together.
+            for index in &pen.all.order {
+                let piece = &mut pen.pieces[*index as usize];
+                piece.first_cell = cells;
+                piece.cells = (piece.length / cell).ceil().max(1.0) as u32;
+                cells += piece.cells;
+                piece.first_block = blocks;
+                blocks += piece.cells.div_ceil(BLOCK as u32);
+            }
         }
         Self {
             pens,
