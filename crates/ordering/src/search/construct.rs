@@ -2,8 +2,12 @@
 
 use super::problem::{End, Problem, mate};
 use super::tree::Tree;
+use crate::progress::Progress;
 
 const UNLINKED: End = End::MAX;
+
+/// Strokes from one report of progress to the next.
+const STROKES_BETWEEN_REPORTS: usize = 1024;
 
 /// Search trees for partners of an end: all ends, or ends of the other parity if strokes may not be
 /// reversed.
@@ -38,13 +42,16 @@ impl Partners {
 /// From the depot, always to the nearest end (in the plane) of an undrawn stroke. Best on hatches.
 ///
 /// If the start is free, the tour starts with the first stroke of the file.
-pub(crate) fn nearest_neighbour(problem: &Problem) -> Vec<End> {
+pub(crate) fn nearest_neighbour(problem: &Problem, progress: Progress<'_>) -> Vec<End> {
     let ends: Vec<End> = (2..problem.end_count() as End).collect();
     let mut partners = Partners::new(problem, &ends);
     let mut tour = Vec::with_capacity(problem.stroke_count());
     tour.push(0);
     let mut found = Vec::with_capacity(1);
     while tour.len() < problem.stroke_count() {
+        if tour.len().is_multiple_of(STROKES_BETWEEN_REPORTS) {
+            progress.done(tour.len() as f64 / problem.stroke_count() as f64);
+        }
         let from = mate(tour[tour.len() - 1]);
         let entry = if problem.is_placed(from) {
             partners.of(from).nearest(problem.point(from), 1, [from; 2], &mut found);
@@ -65,7 +72,7 @@ pub(crate) fn nearest_neighbour(problem: &Problem) -> Vec<End> {
 /// Candidates are the nearest ends in the plane. Linked strokes become one fragment; the open ends
 /// of the fragments are the points of the next round, until one fragment is left. Every round
 /// accepts at least the cheapest candidate.
-pub(crate) fn greedy_edge(problem: &Problem) -> Vec<End> {
+pub(crate) fn greedy_edge(problem: &Problem, progress: Progress<'_>) -> Vec<End> {
     const CANDIDATES: usize = 6;
     let count = problem.end_count() as End;
     let mut link = vec![UNLINKED; count as usize];
@@ -74,6 +81,7 @@ pub(crate) fn greedy_edge(problem: &Problem) -> Vec<End> {
     let mut found = Vec::with_capacity(CANDIDATES);
     loop {
         let open: Vec<End> = (0..count).filter(|&end| link[end as usize] == UNLINKED).collect();
+        progress.done(1.0 - open.len() as f64 / f64::from(count));
         let partners = Partners::new(problem, &open);
         let mut moves: Vec<(f64, End, End)> = Vec::with_capacity(open.len() * CANDIDATES);
         for &end in open.iter().filter(|&&end| problem.is_placed(end)) {

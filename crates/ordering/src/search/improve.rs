@@ -50,6 +50,9 @@ pub(crate) struct Search<'p> {
 /// Kicks from one report of progress to the next: some milliseconds.
 const KICKS_BETWEEN_REPORTS: u32 = 4096;
 
+/// Places of a descent from one report of progress to the next.
+const PLACES_BETWEEN_REPORTS: usize = 1024;
+
 impl<'p> Search<'p> {
     /// Work of `new` an end.
     const WORK_OF_END: u64 = 40;
@@ -98,8 +101,11 @@ impl<'p> Search<'p> {
     }
 
     /// Descends to a local optimum.
-    pub(crate) fn descend(&mut self) {
+    pub(crate) fn descend(&mut self, progress: impl Fn(f64)) {
         for place in 0..self.tour.len() {
+            if place.is_multiple_of(PLACES_BETWEEN_REPORTS) {
+                progress(place as f64 / self.tour.len() as f64);
+            }
             for end in self.tour.link_before(place) {
                 self.enqueue(end);
                 self.settle();

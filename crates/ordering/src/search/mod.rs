@@ -27,11 +27,22 @@ const MIRRORED: (usize, u64) = (950, 50);
 /// Up to this number of strokes every start is searched from; they share the work.
 const SEVERAL_STARTS: usize = 3000;
 
+/// The share of a descent in the progress of a level.
+const DESCENT: f64 = 0.3;
+
+/// The shares of the starts in the progress of a large search: until the nearest neighbours are linked, and
+/// until the cheapest links are.
+const STARTS: [f64; 2] = [0.04, 0.12];
+
 /// The best tour found from several starts. File order is one of them, so the result is never
 /// worse.
 pub(crate) fn solve(problem: &Problem, (effort, all): (u8, usize), progress: Progress<'_>) -> Vec<End> {
-    let starts =
-        [problem.file_order(), construct::nearest_neighbour(problem), construct::greedy_edge(problem)];
+    let starts = [
+        problem.file_order(),
+        construct::nearest_neighbour(problem, progress.part(0.0, STARTS[0])),
+        construct::greedy_edge(problem, progress.part(STARTS[0], STARTS[1])),
+    ];
+    let progress = progress.part(STARTS[1], 1.0);
     let mut best = Best::new(problem, starts[0].clone());
     let n = problem.stroke_count();
     // Several pens share the work of one drawing.
@@ -98,8 +109,9 @@ fn improve(problem: &Problem, tour: Vec<End>, work: u64, progress: Progress<'_>)
         before += share;
         let mut level = Contracted::new(problem, best.tour.clone(), contracted);
         let mut search = Search::new(&level.problem, level.problem.file_order());
-        search.descend();
-        search.kick(work / 1000 * share, &mut random, |share| progress.done(share));
+        let (descent, kicks) = (progress.part(0.0, DESCENT), progress.part(DESCENT, 1.0));
+        search.descend(|share| descent.done(share));
+        search.kick(work / 1000 * share, &mut random, |share| kicks.done(share));
         let mut tour = search.finish();
         if contracted == MIRRORED.0 && !problem.one_way {
             tour = mirror(&mut level, tour, work / 1000 * MIRRORED.1, &mut random);
@@ -122,7 +134,7 @@ fn mirror(level: &mut Contracted, tour: Vec<End>, work: u64, random: &mut Random
         let before = level.problem.tour_cost(&best);
         let increase = level.mirror(run);
         let mut search = Search::new(&level.problem, best.clone());
-        search.descend();
+        search.descend(|_| {});
         search.kick(20 * runs as u64, random, |_| {});
         done += search.work();
         let tour = search.finish();

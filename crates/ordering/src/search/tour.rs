@@ -5,6 +5,12 @@ use super::problem::{End, Problem, mate};
 /// The largest number of links that a move exchanges.
 pub(crate) const MOST_LINKS: usize = 3;
 
+/// The largest number of strokes that an exchange may rewrite. Without a limit the work of an exchange grows
+/// with the number of strokes, and that of the search with its square (Johnson and McGeoch 1997 limit the
+/// length of a reversal likewise). An exchange leaves its longest stretch, at least a third of the tour, in
+/// place: up to 150,000 strokes nothing is limited.
+const MOST_REWRITTEN: usize = 100_000;
+
 /// Strokes in the order they are visited, each given by the end at which it is entered.
 pub(crate) struct Tour {
     entries: Vec<End>,
@@ -27,6 +33,13 @@ struct Stretch {
 pub(crate) struct Plan {
     stretches: [Stretch; MOST_LINKS],
     count: usize,
+}
+
+impl Plan {
+    /// The number of strokes of a tour of `n` that are rewritten: all but the longest stretch.
+    fn rewritten(&self, n: usize) -> usize {
+        n - self.stretches[..self.count].iter().map(|stretch| stretch.length).max().unwrap_or(0)
+    }
 }
 
 impl Tour {
@@ -67,7 +80,7 @@ impl Tour {
     }
 
     /// The tour after replacing the links `(e0,e1), (e2,e3), …` by `(e1,e2), …, (e_last,e0)`;
-    /// `None` if the result is not one tour.
+    /// `None` if the result is not one tour, or if too many strokes would have to be rewritten.
     ///
     /// The removed links, sorted by index, cut the tour into stretches. Following the new links
     /// must visit all stretches (Helsgaun 2009, section 5.1: the cost of the test depends on the
@@ -104,7 +117,8 @@ impl Tour {
             cut = rank[enters / 2];
             forward = cuts[cut].1 == enters;
             if cut == 0 && forward {
-                return (visited + 1 == count).then_some(plan);
+                let is_tour = visited + 1 == count;
+                return (is_tour && plan.rewritten(self.entries.len()) <= MOST_REWRITTEN).then_some(plan);
             }
         }
         None
@@ -207,6 +221,19 @@ mod tests {
                 return count;
             }
         }
+    }
+
+    #[test]
+    fn exchange_rewrites_a_limited_number_of_strokes() {
+        let strokes = 3 * MOST_REWRITTEN;
+        let tour = Tour::new((0..strokes as End).map(|stroke| 2 * stroke).collect());
+        let reversal = |first: usize, length: usize| {
+            let ([a, b], [c, d]) = (tour.link_before(first), tour.link_before(first + length));
+            tour.reconnect(&[b, a, c, d]).map(|plan| plan.rewritten(strokes))
+        };
+        assert_eq!(reversal(1000, MOST_REWRITTEN), Some(MOST_REWRITTEN));
+        assert_eq!(reversal(1000, MOST_REWRITTEN + 1), None);
+        assert_eq!(reversal(10, strokes - 500), Some(500));
     }
 
     proptest! {
