@@ -66,18 +66,12 @@ pub fn optimize_with_progress(
     options: &Options,
     progress: &dyn Fn(f64),
 ) -> (Drawing, Report) {
-    let strokes: Vec<Stroke> = drawing.strokes.into_iter().collect();
+    let strokes = drawing.strokes.to_vec();
     let strokes_before = strokes.len();
     let (travel_cost_before, travel_mm_before) = report::travel(&strokes, cost, options);
-    let mut pens = by_pen(strokes, options.pen_order.as_deref());
-    if options.dedupe {
-        pens = pens.into_iter().map(dedupe::dedupe).collect();
-    }
+    let mut pens = in_file_order(strokes, options);
     let (limit, mm_in_file_order) = report::travel(pens.iter().flatten(), cost, options);
-    // Packed: it is needed again only if the search finds nothing better.
-    let mut in_file_order = Strokes::default();
-    pens.iter().flatten().for_each(|stroke| in_file_order.push(stroke));
-    let strokes_without_duplicates = in_file_order.len();
+    let strokes_without_duplicates = pens.iter().map(Vec::len).sum::<usize>();
     if options.merge {
         pens = pens.into_iter().map(|strokes| merge::merge(strokes, options.keep_direction)).collect();
     }
@@ -86,10 +80,13 @@ pub fn optimize_with_progress(
     let (found, found_mm) = report::travel(&ordered, cost, options);
     // With NaN the comparison is false and file order is kept. A rounding error must not decide.
     let (strokes, travel_cost_after, travel_mm_after) = if found <= limit + 1e-9 * limit {
-        drop(in_file_order);
+        drop(drawing);
         (Strokes::from(ordered), found, found_mm)
     } else {
-        (in_file_order, limit, mm_in_file_order)
+        // Made again: kept during the search, which seldom finds nothing, it would take memory.
+        drop(ordered);
+        let strokes = in_file_order(drawing.strokes.into_iter().collect(), options);
+        (strokes.into_iter().flatten().collect(), limit, mm_in_file_order)
     };
     let report = Report {
         strokes_before,
@@ -102,6 +99,12 @@ pub fn optimize_with_progress(
         travel_mm_after,
     };
     (Drawing { strokes }, report)
+}
+
+/// The strokes of each pen in file order, without duplicates if the options say so.
+fn in_file_order(strokes: Vec<Stroke>, options: &Options) -> Vec<Vec<Stroke>> {
+    let pens = by_pen(strokes, options.pen_order.as_deref());
+    if options.dedupe { pens.into_iter().map(dedupe::dedupe).collect() } else { pens }
 }
 
 /// The strokes of each pen in file order; pens as in `pen_order`, then by their first stroke.

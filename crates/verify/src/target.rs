@@ -217,23 +217,25 @@ impl BoxTree {
     /// number.
     fn visit(&self, bounds: Rect, mut to: impl FnMut(Line, u32)) {
         let wider = bounds.inflate(self.rounding, self.rounding);
-        let mut open = vec![(self.levels.len() - 1, 0)];
-        while let Some((level, index)) = open.pop() {
-            if !meet(self.levels[level][index], bounds) {
-                continue;
+        self.visit_box(self.levels.len() - 1, 0, [bounds, wider], &mut to);
+    }
+
+    /// The lines in a box of a level. There are at most 11 levels.
+    fn visit_box(&self, level: usize, index: usize, bounds: [Rect; 2], to: &mut impl FnMut(Line, u32)) {
+        if !meet(self.levels[level][index], bounds[0]) {
+            return;
+        }
+        let (first, end) = (FAN * index, FAN * (index + 1));
+        if level > 0 {
+            for child in (first..end.min(self.levels[level - 1].len())).rev() {
+                self.visit_box(level - 1, child, bounds, to);
             }
-            let children = FAN * index..FAN * (index + 1);
-            if level > 0 {
-                open.extend(
-                    children.take_while(|i| *i < self.levels[level - 1].len()).map(|i| (level - 1, i)),
-                );
-            } else {
-                let items = children.start..children.end.min(self.order.len());
-                for (line, index) in self.lines[items.clone()].iter().zip(&self.order[items]) {
-                    if line.meets(wider) {
-                        to(*line, *index);
-                    }
-                }
+            return;
+        }
+        let items = first..end.min(self.order.len());
+        for (line, index) in self.lines[items.clone()].iter().zip(&self.order[items]) {
+            if line.meets(bounds[1]) {
+                to(*line, *index);
             }
         }
     }

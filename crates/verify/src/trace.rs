@@ -174,7 +174,10 @@ impl Trace {
                 if scope != Scope::Followed && is_crowded {
                     self.follower.start(strokes, run.to, self.radius, &self.candidates);
                 }
-                self.follower.remember(run, before, self.radius);
+                // With all pieces as candidates the run has covered what it can.
+                if scope != Scope::All {
+                    self.follower.remember(run, before, self.radius);
+                }
             }
             let largest = self.bound_along(strokes, &run, nearest, common);
             let known = self.worst.map_or(0.0, |worst| worst.mm);
@@ -201,7 +204,7 @@ impl Trace {
         if self.follows {
             // By the lines, which lie side by side in memory: which pieces are left out does not matter here.
             let near = self.near.iter().filter(|(line, _)| line.meets(bounds));
-            if near.clone().count() > CROWD {
+            if near.clone().nth(CROWD).is_some() {
                 let radius = self.radius + strokes.line_error();
                 self.candidates.clear();
                 let alongside = near.filter(|(line, _)| line.is_alongside(run, radius));
