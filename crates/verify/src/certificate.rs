@@ -79,7 +79,9 @@ pub struct DeviationStats {
     /// the ink, and by at most 1/8 for the drawing (1/500 where straight parts of the ink are
     /// longer than that).
     pub max_mm: f64,
-    /// 99 % of the length has at most this distance, mm; overstated by at most 1/64 of itself. Dots
+    /// 99 % of the length has at most this distance, mm. For the drawing overstated by at most 1/64 of itself
+    /// and 3/8 of the tolerance. For the ink at most 1/12 and 1/50 of the tolerance above the percentile that
+    /// results if each run of ink, at most a step between two rows, has its largest distance throughout. Dots
     /// have no length and count for the maximum only.
     pub p99_mm: f64,
     /// Whether `max_mm` is only a lower bound, because no ink came near a part of the drawing.

@@ -184,6 +184,14 @@ mod tests {
     }
 
     #[test]
+    fn exact_positions_have_no_allowance() {
+        // 10^7 ticks/s³ are 10 ticks a third difference.
+        assert!(JerkCheck::exact(1e7, PERIOD_US).step(PERIOD_US, 10.0).is_none());
+        let excess = JerkCheck::exact(1e7, PERIOD_US).step(PERIOD_US, 10.1).expect("above the limit");
+        assert!((excess.value - 1.01e7).abs() < 1.0 && excess.allowed == 1e7, "{excess:?}");
+    }
+
+    #[test]
     fn nan_limit_is_exceeded() {
         assert!(JerkCheck::new(f64::NAN, 0).step(1, 1.0).is_some());
     }

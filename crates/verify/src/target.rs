@@ -502,5 +502,8 @@ mod tests {
         for crossing in [piece((1.0, -2.0), (1.0, 2.0)), piece((-5.0, -3.0), (9.0, 4.0))] {
             assert!(!crossing.is_alongside(&run, 0.5), "{crossing:?}");
         }
+        // By the ends of the piece, in mm whatever the length of the run.
+        assert!(piece((0.1, 0.4), (3.0, 0.4)).is_alongside(&run, 0.5));
+        assert!(!piece((1.0, 0.8), (1.5, 0.8)).is_alongside(&run, 0.5));
     }
 }
