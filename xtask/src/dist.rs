@@ -1,5 +1,5 @@
 //! What a release consists of: archives with checksums, the Debian package, the wheel. Tools are called as
-//! programs: `cargo zigbuild` for other systems, `tar`, `gzip`, `zip`, `dpkg-deb`, `maturin`.
+//! programs: `cargo zigbuild` for macOS, `tar`, `gzip`, `zip`, `dpkg-deb`, `maturin`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,16 +12,16 @@ use crate::programs::{commands, execute, output_of, text_of, version, write};
 /// A system that archives are made for.
 struct Target {
     triple: &'static str,
-    /// Whether Rust links it without a C compiler for it: musl, statically.
-    by_rust: bool,
+    /// The command of Cargo that builds it.
+    tool: &'static str,
     windows: bool,
 }
 
 const TARGETS: &[Target] = &[
-    Target { triple: NATIVE, by_rust: true, windows: false },
-    Target { triple: "aarch64-unknown-linux-musl", by_rust: true, windows: false },
-    Target { triple: "x86_64-pc-windows-gnu", by_rust: false, windows: true },
-    Target { triple: "aarch64-apple-darwin", by_rust: false, windows: false },
+    Target { triple: NATIVE, tool: "build", windows: false },
+    Target { triple: "aarch64-unknown-linux-musl", tool: "build", windows: false },
+    Target { triple: "x86_64-pc-windows-gnu", tool: "build", windows: true },
+    Target { triple: "aarch64-apple-darwin", tool: "zigbuild", windows: false },
 ];
 
 /// Runs on the machine that builds, and is in the Debian package and the wheel too: man pages and completions
@@ -96,17 +96,26 @@ fn triples() -> Vec<&'static str> {
 pub(crate) fn build(triple: &str) -> Result<PathBuf> {
     let known = TARGETS.iter().find(|target| target.triple == triple);
     let target = known.with_context(|| format!("targets are {}", triples().join(", ")))?;
-    execute(Command::new("rustup").args(["target", "add", target.triple]))?;
+    add(triple)?;
     let mut command = Command::new("cargo");
-    command.arg(if target.by_rust { "build" } else { "zigbuild" });
+    command.arg(target.tool);
     command.args(["--release", "--locked", "-p", "plotplan", "--target", target.triple]);
     command.env("PLOTPLAN_STUDIO", STUDIO);
-    // Pure Rust: its own linker is enough.
-    command.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld");
-    execute(&mut command)
-        .context("other systems need cargo-zigbuild and zig (`pip install cargo-zigbuild`)")?;
+    execute(with_linker(&mut command)).context(
+        "Windows needs Debian's gcc-mingw-w64-x86-64; macOS needs cargo-zigbuild, zig and Apple's SDK",
+    )?;
     let name = if target.windows { "plotplan.exe" } else { "plotplan" };
     Ok(crate::top().join("target").join(target.triple).join("release").join(name))
+}
+
+/// Installs the standard library of a target.
+pub(crate) fn add(triple: &str) -> Result<()> {
+    execute(Command::new("rustup").args(["target", "add", triple]))
+}
+
+/// The linkers of targets for Cargo. Pure Rust: its own linker is enough for another processor.
+pub(crate) fn with_linker(command: &mut Command) -> &mut Command {
+    command.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld")
 }
 
 /// Man pages, completions and machine files, printed by the program itself; returns their folder.

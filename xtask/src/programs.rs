@@ -119,12 +119,22 @@ pub(crate) fn build(profile: &str) -> Result<PathBuf> {
     executable.context("cargo did not report the path of the binary")
 }
 
-/// CPU time that a process has used, by Linux's `/proc/PID/stat`: fields 14 and 15, user and system
-/// time in hundredths of a second (`proc_pid_stat(5)`; `USER_HZ` is 100 on all its architectures).
+/// CPU time that a process has used. `None` where there is no `/proc`.
 pub(crate) fn cpu_time(process: u32) -> Option<Duration> {
+    fields_of_stat(process, 14)
+}
+
+/// CPU time of the programs that have ended, of this process and of theirs.
+pub(crate) fn cpu_time_of_children() -> Option<Duration> {
+    fields_of_stat(std::process::id(), 16)
+}
+
+/// By Linux's `/proc/PID/stat`: fields 14 and 15, user and system time in hundredths of a second, or 16 and 17,
+/// those of the children waited for (`proc_pid_stat(5)`; `USER_HZ` is 100 on all its architectures).
+fn fields_of_stat(process: u32, first: usize) -> Option<Duration> {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // The name of the program, field 2, is in parentheses and may contain blanks.
     let fields: Vec<&str> = stat.rsplit_once(") ")?.1.split(' ').collect();
-    let hundredths: u64 = fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
-    Some(Duration::from_millis(10 * hundredths))
+    let hundredths = |field: usize| fields.get(field - 3)?.parse::<u64>().ok();
+    Some(Duration::from_millis(10 * (hundredths(first)? + hundredths(first + 1)?)))
 }
