@@ -82,7 +82,9 @@ fn repeated(strokes: &[&Stroke]) -> (Vec<u32>, Vec<u32>) {
     hashes.sort_unstable();
     let mut number = vec![ONCE; hashes.len()];
     for same in hashes.chunk_by(|a, b| a >> 32 == b >> 32).filter(|same| same.len() > 1) {
-        same.iter().for_each(|item| number[*item as u32 as usize] = 0);
+        for item in same {
+            number[*item as u32 as usize] = 0;
+        }
     }
     drop(hashes);
     let mut keys: Vec<(SegmentKey, u32)> = segments()
@@ -94,7 +96,9 @@ fn repeated(strokes: &[&Stroke]) -> (Vec<u32>, Vec<u32>) {
     let mut drawn = Vec::new();
     for same in keys.chunk_by(|a, b| a.0 == b.0) {
         let shared = if same.len() > 1 { drawn.len() as u32 } else { ONCE };
-        same.iter().for_each(|(_, index)| number[*index as usize] = shared);
+        for (_, index) in same {
+            number[*index as usize] = shared;
+        }
         if same.len() > 1 {
             drawn.push(same.len() as u32);
         }
@@ -155,9 +159,12 @@ mod tests {
             let others = (0..strokes.len()).filter(|&other| other != at);
             keep[at] = if strokes[at].is_dot() {
                 let mine = dot(strokes[at].start());
-                !others.clone().any(|other| match strokes[other].is_dot() {
-                    true => other < at && dot(strokes[other].start()) == mine,
-                    false => strokes[other].points().any(|vertex| dot(vertex) == mine),
+                !others.clone().any(|other| {
+                    if strokes[other].is_dot() {
+                        other < at && dot(strokes[other].start()) == mine
+                    } else {
+                        strokes[other].points().any(|vertex| dot(vertex) == mine)
+                    }
                 })
             } else {
                 let drawn: Vec<SegmentKey> =

@@ -6,8 +6,8 @@ use super::problem::{End, Problem, mate};
 pub(crate) const MOST_LINKS: usize = 3;
 
 /// The largest number of strokes that an exchange may rewrite. Without a limit the work of an exchange grows
-/// with the number of strokes, and that of the search with its square (Johnson and McGeoch 1997 limit the
-/// length of a reversal likewise). An exchange leaves its longest stretch, at least a third of the tour, in
+/// with the number of strokes, and that of the search with its square (D. S. Johnson 1997 limits the length
+/// of a reversal likewise). An exchange leaves its longest stretch, at least a third of the tour, in
 /// place: up to 150,000 strokes nothing is limited.
 const MOST_REWRITTEN: usize = 100_000;
 
