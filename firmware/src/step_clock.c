@@ -23,52 +23,86 @@ void cutter_start(struct cutter *cutter, const struct segment *segment) {
     }
 }
 
-/* Advances from the last piece's end to this one's and counts the steps in between. */
-static void cut_motor(struct cutter *cutter, uint8_t i, struct piece_steps *steps, uint16_t duration) {
-    uint32_t next = cutter->motor[i].next, interval = cutter->motor[i].interval;
-    uint16_t total = cutter->motor[i].total, left = cutter->motor[i].steps;
-    uint16_t error = cutter->motor[i].error, remainder = cutter->motor[i].remainder, made = 0;
-    steps->steps = 0;
-    if (left == 0) {
-        return;
-    }
-    if (next < duration) {
-        steps->first = (uint16_t)next;
-        steps->interval = interval > UINT16_MAX ? UINT16_MAX : (uint16_t)interval;
-        steps->remainder = remainder;
-        steps->total = total;
-        steps->error = error;
-        if (cutter->left == duration) {
-            made = left; /* the segment's last piece has all that is left */
-        } else {
-            do {
-                made++;
-                next += interval;
-                error += remainder;
-                if (error >= total) {
-                    error -= total;
-                    next++;
-                }
-            } while (made < left && next < duration);
+/* A motor's steps in a piece whose end is not decided yet. */
+struct course {
+    uint32_t next, last; /* the first step that is not made, the last one that is; 0 if none is */
+    uint16_t made, error;
+};
+
+/* Makes the steps before `end`. */
+static void advance(const struct cutter *cutter, uint8_t i, struct course *course, uint32_t end) {
+    uint32_t next = course->next, last = course->last, interval = cutter->motor[i].interval;
+    uint16_t steps = cutter->motor[i].steps, total = cutter->motor[i].total, remainder = cutter->motor[i].remainder;
+    uint16_t made = course->made, error = course->error;
+    while (made < steps && next < end) {
+        made++;
+        last = next;
+        next += interval;
+        error += remainder;
+        if (error >= total) {
+            error -= total;
+            next++;
         }
     }
-    steps->steps = made;
-    cutter->motor[i].steps = left - made;
-    cutter->motor[i].next = next - duration;
-    cutter->motor[i].error = error;
+    *course = (struct course){.next = next, .last = last, .made = made, .error = error};
+}
+
+/* Where to cut a row at about `end`: clear of the steps of both motors, so that the next piece is loaded in time for the
+ * step after the cut. */
+static uint16_t cut_clear(const struct cutter *cutter, struct course courses[2], uint32_t end) {
+    for (uint8_t shift = 0; shift < CUT_SHIFTS; shift++) {
+        uint32_t clear = end;
+        for (uint8_t i = 0; i < 2; i++) {
+            struct course *course = &courses[i];
+            advance(cutter, i, course, end);
+            uint32_t step = course->made < cutter->motor[i].steps && course->next < end + CUT_CLEARANCE ? course->next
+                            : course->made                                                             ? course->last
+                                                                                                       : 0;
+            if (step && step + CUT_CLEARANCE > clear) {
+                clear = step + CUT_CLEARANCE;
+            }
+        }
+        if (clear == end) {
+            break;
+        }
+        end = clear;
+    }
+    return (uint16_t)end;
 }
 
 void cutter_cut(struct cutter *cutter, struct piece *piece) {
-    uint32_t left = cutter->left;
-    /* Two halves instead of a long and a very short one. */
-    uint16_t duration = left > 2UL * PIECE_LONGEST ? PIECE_LONGEST
-                        : left > PIECE_LONGEST     ? (uint16_t)(left / 2)
-                                                   : (uint16_t)left;
-    piece->duration = duration;
+    uint32_t left = cutter->left, duration = left;
+    struct course courses[2];
+    for (uint8_t i = 0; i < 2; i++) {
+        courses[i] = (struct course){.next = cutter->motor[i].next, .error = cutter->motor[i].error};
+    }
+    if (left > PIECE_LONGEST) {
+        /* Two halves instead of a long and a very short one. */
+        duration = cut_clear(cutter, courses, left > 2UL * PIECE_LONGEST ? PIECE_LONGEST : left / 2);
+    }
+    piece->duration = (uint16_t)duration;
     piece->backwards = cutter->backwards;
     piece->pen = cutter->pen;
     for (uint8_t i = 0; i < 2; i++) {
-        cut_motor(cutter, i, &piece->motor[i], duration);
+        struct course *course = &courses[i];
+        struct piece_steps *steps = &piece->motor[i];
+        uint32_t interval = cutter->motor[i].interval;
+        if (duration == left) {
+            course->made = cutter->motor[i].steps; /* the segment's last piece has all that is left */
+        } else {
+            advance(cutter, i, course, duration);
+        }
+        steps->steps = course->made;
+        if (course->made) {
+            steps->first = (uint16_t)cutter->motor[i].next;
+            steps->interval = interval > UINT16_MAX ? UINT16_MAX : (uint16_t)interval;
+            steps->remainder = cutter->motor[i].remainder;
+            steps->total = cutter->motor[i].total;
+            steps->error = cutter->motor[i].error;
+        }
+        cutter->motor[i].steps -= course->made;
+        cutter->motor[i].next = course->next - duration;
+        cutter->motor[i].error = course->error;
     }
     cutter->left = left - duration;
 }

@@ -120,7 +120,7 @@ impl Trace {
     }
 }
 
-/// Steps should be this close to their time, us.
+/// Steps are this close to their time, us.
 pub(super) const STEP_BOUND_US: f64 = 16.0;
 
 /// How early and how late steps are, us, relative to the median: a constant delay moves the whole
@@ -129,8 +129,6 @@ pub(super) const STEP_BOUND_US: f64 = 16.0;
 pub(super) struct Jitter {
     pub(super) early_us: f64,
     pub(super) late_us: f64,
-    /// Steps that are further than [`STEP_BOUND_US`] from their time.
-    pub(super) beyond: usize,
 }
 
 impl std::fmt::Display for Jitter {
@@ -159,8 +157,7 @@ pub(super) fn compare(plan: &Steps, trace: &Trace) -> Result<Jitter> {
     late.sort_by(f64::total_cmp);
     let (Some(first), Some(last)) = (late.first(), late.last()) else { return Ok(Jitter::default()) };
     let median = late[late.len() / 2];
-    let beyond = late.iter().filter(|late| (**late - median).abs() > STEP_BOUND_US).count();
-    Ok(Jitter { early_us: median - first, late_us: last - median, beyond })
+    Ok(Jitter { early_us: median - first, late_us: last - median })
 }
 
 /// Only number and direction: where the queue may have run empty.
