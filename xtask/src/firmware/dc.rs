@@ -19,7 +19,7 @@ use super::trace::{Steps, Trace};
 const IMAGE: &str = "uno-dc";
 /// Ticks/s per percent of duty, s, stiction and friction in percent, as `app/dc.h` assumes.
 const MOTOR: [f64; 4] = [106.67, 0.12, 8.0, 6.0];
-/// The gains of `app/dc.h`: % per tick, % per tick and s.
+/// The gains of `app/parts.h`: % per tick, % per tick and s.
 const GAINS: [f64; 2] = [1.5, 2.0];
 /// The firmware's loop: fixed point, 1 ms.
 const PERIOD_S: f64 = 1e-3;
@@ -219,7 +219,7 @@ fn homed_against_stops(bench: &Bench) -> Result<String> {
 
 /// Where a plan ends after homing: the datum is that of the contact, whatever the motors' place at rest is.
 const ARRIVED_TICKS: i64 = 2;
-/// `stop_duty` of `app/stops.h`.
+/// `stop_duty` of `app/parts.h`.
 const STOP_DUTY_PERCENT: f64 = 20.0;
 
 /// The loop closed, the datum from the stops: every place of zot is drawn where the counts say.

@@ -35,8 +35,14 @@ pub(crate) struct Raw;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Paced;
 
+/// The lines as they are.
 fn program(plan: &PlanSource<'_>) -> Result<Program, ProgramError> {
-    Program::of_table(plan.table(), Arc::new(TickLineEncoder))
+    Program::of_table(plan.table(), Arc::new(TickLineEncoder { checks_end: false }))
+}
+
+/// With a check of the end, which a reader that answers can report.
+fn checked_program(plan: &PlanSource<'_>) -> Result<Program, ProgramError> {
+    Program::of_table(plan.table(), Arc::new(TickLineEncoder { checks_end: true }))
 }
 
 fn invalid(error: &plan::file::WriteError) -> Unrepresentable {
@@ -77,7 +83,7 @@ impl Backend for Answered {
     }
 
     fn program(&self, plan: &PlanSource<'_>, _options: &EncodeOptions) -> Result<Program, ProgramError> {
-        program(plan)
+        checked_program(plan)
     }
 
     fn pen_program(
@@ -87,7 +93,7 @@ impl Backend for Answered {
         _down: bool,
     ) -> Result<Program, ProgramError> {
         // The rows have the pen.
-        program(plan)
+        checked_program(plan)
     }
 
     fn continuing_program(
@@ -96,7 +102,7 @@ impl Backend for Answered {
         _options: &EncodeOptions,
         start: [i64; 2],
     ) -> Result<Program, ProgramError> {
-        Program::continuing(plan.table(), Arc::new(TickLineEncoder), start)
+        Program::continuing(plan.table(), Arc::new(TickLineEncoder { checks_end: true }), start)
     }
 
     fn session(&self, program: Program, options: &SessionOptions) -> Option<Box<dyn Session>> {
@@ -179,7 +185,19 @@ impl Backend for Paced {
 
 /// Rows as tick lines without comments, as [`tick_lines`] writes them.
 #[derive(Clone, Copy, Debug)]
-struct TickLineEncoder;
+struct TickLineEncoder {
+    /// Whether a sync line with the plan's last position comes before `end`, which has none: a last row that was damaged
+    /// without a wrong checksum is reported.
+    checks_end: bool,
+}
+
+/// `s MOVES DURATION T1 T2` for `end 0 MOVES DURATION`, after the line `before`; `None` if that is a sync line, or if the
+/// pen stays down.
+fn end_check(end: &str, before: &Line) -> Option<Line> {
+    let counts = end.strip_prefix("end 0 ")?;
+    let [a, b] = before.position?;
+    Some(Line { text: format!("s {counts} {a} {b}"), row: before.row, ..Line::default() })
+}
 
 impl RowEncoder for TickLineEncoder {
     fn lines(
@@ -201,6 +219,8 @@ impl RowEncoder for TickLineEncoder {
                 line.row = row as u64;
                 line.duration_us = table.rows[row].t_us - table.rows[row - 1].t_us;
                 line.position = Some(table.rows[row].ticks);
+            } else if self.checks_end {
+                lines.extend(lines.last().and_then(|before| end_check(text, before)));
             }
             lines.push(line);
         }
@@ -218,5 +238,62 @@ impl RowEncoder for TickLineEncoder {
             Some(Line { text, duration_us: LIFT_US, position: Some(position), ..Line::default() })
         });
         lift.into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::Outcome;
+
+    const PLAN: &str = "; plotplan: 1\n; machine: coaxial\n; motors: arm1 arm2\n; limits arm1 speed: 533.3\n\
+        ; limits arm1 acceleration: 2666.7\n; limits arm2 speed: 533.3\n; limits arm2 acceleration: 2666.7\n\
+        ; placement a b: 1 0\n; placement c d: 0 1\n; placement e f: 0 0\n; period_us: 10000\n\
+        begin 1 2 20000\ns 0 0 800 0\nm 0 10000 801 -1\nm 0 10000 803 -4\nend 0 2 20000\n";
+
+    fn program(checks_end: bool) -> Program {
+        let plan = tick_lines::read(PLAN.as_bytes()).unwrap();
+        Program::of_table(plan, Arc::new(TickLineEncoder { checks_end })).unwrap()
+    }
+
+    #[test]
+    fn sync_line_before_the_end_has_the_last_position() {
+        let lines = |checks_end| -> Vec<String> {
+            program(checks_end).lines.into_iter().skip(3).map(|line| line.text).collect()
+        };
+        assert_eq!(lines(true), ["m 0 10000 803 -4", "s 2 20000 803 -4", "end 0 2 20000"]);
+        assert_eq!(lines(false), ["m 0 10000 803 -4", "end 0 2 20000"]);
+    }
+
+    /// Sends the plan over a wire that replaces `from` by `to`.
+    fn outcome(from: &str, to: &str, checks_end: bool) -> Outcome {
+        let framing = Box::new(framing::TickLineFraming::for_machine("coaxial"));
+        let mut session = SlidingWindow::new(program(checks_end), framing, None);
+        let mut reader = emulator::TickLineReader::new(&EmulatorOptions::default());
+        for now_us in (0..10_000_000).step_by(1000) {
+            let sent = String::from_utf8(session.transmit(now_us)).unwrap();
+            reader.receive(sent.replace(from, to).as_bytes(), now_us);
+            reader.advance(now_us);
+            for answer in reader.answers() {
+                session.receive(&answer, now_us);
+            }
+            if let Some(outcome) = session.outcome() {
+                return outcome.clone();
+            }
+        }
+        panic!("the session does not end");
+    }
+
+    #[test]
+    fn damaged_last_row_is_reported() {
+        // The same bit in two bytes: the checksum is right.
+        let (sound, damaged) = ("803 -4*", "802 -5*");
+        assert_eq!(framing::framed("803 -4")[6..], framing::framed("802 -5")[6..]);
+        assert!(matches!(outcome(sound, sound, true), Outcome::Done));
+        let Outcome::Failed { why, .. } = outcome(sound, damaged, true) else {
+            panic!("it was not reported")
+        };
+        assert!(why.contains("the motors are not there"), "{why}");
+        assert!(matches!(outcome(sound, damaged, false), Outcome::Done));
     }
 }
