@@ -422,6 +422,7 @@ impl Machine {
     }
 
     /// Its mechanism.
+    #[inline]
     pub fn mechanism(&self) -> &dyn Mechanism {
         &*self.parts.mechanism
     }
@@ -432,11 +433,13 @@ impl Machine {
     }
 
     /// Its motors.
+    #[inline]
     pub fn motors(&self) -> &[Motor; 2] {
         &self.parts.motors
     }
 
     /// The limits of its pen.
+    #[inline]
     pub fn pen(&self) -> &PenLimits {
         &self.parts.pen
     }
@@ -472,6 +475,7 @@ impl Machine {
     }
 
     /// Joint velocities (or accelerations, ...) as those of the motors: ticks/s from rad/s and mm/s.
+    #[inline]
     pub fn motor_rates(&self, joint_rates: &JointPos) -> MotorPos {
         MotorPos(product(&self.to_ticks, joint_rates.0))
     }
@@ -588,6 +592,7 @@ impl Machine {
 }
 
 /// `M v`.
+#[inline]
 fn product(m: &Matrix2<f64>, [a, b]: [f64; 2]) -> [f64; 2] {
     [m.m11 * a + m.m12 * b, m.m21 * a + m.m22 * b]
 }

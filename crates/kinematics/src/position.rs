@@ -40,12 +40,14 @@ macro_rules! position {
         }
 
         impl From<[f64; 2]> for $name {
+            #[inline]
             fn from(components: [f64; 2]) -> Self {
                 Self(components)
             }
         }
 
         impl From<$name> for [f64; 2] {
+            #[inline]
             fn from(vector: $name) -> Self {
                 vector.0
             }
@@ -54,12 +56,14 @@ macro_rules! position {
         impl Index<usize> for $name {
             type Output = f64;
 
+            #[inline]
             fn index(&self, index: usize) -> &f64 {
                 &self.0[index]
             }
         }
 
         impl IndexMut<usize> for $name {
+            #[inline]
             fn index_mut(&mut self, index: usize) -> &mut f64 {
                 &mut self.0[index]
             }
@@ -68,12 +72,14 @@ macro_rules! position {
         impl Add for $name {
             type Output = Self;
 
+            #[inline]
             fn add(self, other: Self) -> Self {
                 Self([self.0[0] + other.0[0], self.0[1] + other.0[1]])
             }
         }
 
         impl AddAssign for $name {
+            #[inline]
             fn add_assign(&mut self, other: Self) {
                 *self = *self + other;
             }
@@ -82,6 +88,7 @@ macro_rules! position {
         impl Sub for $name {
             type Output = Self;
 
+            #[inline]
             fn sub(self, other: Self) -> Self {
                 Self([self.0[0] - other.0[0], self.0[1] - other.0[1]])
             }
@@ -90,6 +97,7 @@ macro_rules! position {
         impl Neg for $name {
             type Output = Self;
 
+            #[inline]
             fn neg(self) -> Self {
                 Self([-self.0[0], -self.0[1]])
             }
@@ -98,6 +106,7 @@ macro_rules! position {
         impl Mul<f64> for $name {
             type Output = Self;
 
+            #[inline]
             fn mul(self, factor: f64) -> Self {
                 Self([self.0[0] * factor, self.0[1] * factor])
             }
@@ -106,6 +115,7 @@ macro_rules! position {
         impl Div<f64> for $name {
             type Output = Self;
 
+            #[inline]
             fn div(self, divisor: f64) -> Self {
                 Self([self.0[0] / divisor, self.0[1] / divisor])
             }
@@ -114,6 +124,7 @@ macro_rules! position {
         impl Mul<$name> for f64 {
             type Output = $name;
 
+            #[inline]
             fn mul(self, vector: $name) -> $name {
                 vector * self
             }

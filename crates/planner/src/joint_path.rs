@@ -449,11 +449,14 @@ impl Builder<'_> {
 ///
 /// With `n` equal parts and `B` a bound on the second derivative, `|dp/ds|` changes by at most `B /
 /// n` between the ends of a part, so it exceeds the larger end by at most half of that.
+#[inline]
 pub(crate) fn travel_speed(machine: &Machine, from: JointPos, to: JointPos) -> f64 {
+    if machine.pen().max_travel_speed_mm_s == f64::INFINITY { 0.0 } else { fastest_pen(machine, from, to) }
+}
+
+/// [`travel_speed`] where there is a limit.
+fn fastest_pen(machine: &Machine, from: JointPos, to: JointPos) -> f64 {
     const PARTS: u32 = 16;
-    if machine.pen().max_travel_speed_mm_s == f64::INFINITY {
-        return 0.0;
-    }
     let geometry = machine.mechanism();
     let change = to - from;
     let speed = |k: u32| {

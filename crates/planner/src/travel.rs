@@ -17,21 +17,21 @@ pub fn travel_pose(machine: &Machine, point: Point) -> Option<JointPos> {
 /// All motors start and stop together on a trapezoidal velocity profile. With `v` and `a` the
 /// smallest ratio of a motor's limit to its distance, the time is `2 / sqrt(a)` if the top speed is
 /// not reached (`v² >= a`), else `1 / v + v / a`. Jerk limits are neglected.
+#[inline]
 pub fn travel_time(machine: &Machine, from: &JointPos, to: &JointPos) -> f64 {
     machine.pen().lift_time_s + joint_time(machine, from, to) + machine.pen().drop_time_s
 }
 
 /// The duration of the trapezoidal profile between two poses, s.
+#[inline]
 fn joint_time(machine: &Machine, from: &JointPos, to: &JointPos) -> f64 {
     let change = machine.motor_rates(&(*to - *from));
     let pen = machine.pen().max_travel_speed_mm_s / travel_speed(machine, *from, *to);
     let (mut speed, mut acceleration) = (pen, f64::INFINITY);
-    for (k, motor) in machine.motors().iter().enumerate() {
-        let distance = change[k].abs();
-        if distance > 0.0 {
-            speed = speed.min(motor.max_speed_ticks_s / distance);
-            acceleration = acceleration.min(motor.max_acceleration_ticks_s2 / distance);
-        }
+    for (motor, change) in machine.motors().iter().zip(change.0) {
+        // Infinite where the motor stands still, which limits nothing.
+        speed = speed.min(motor.max_speed_ticks_s / change.abs());
+        acceleration = acceleration.min(motor.max_acceleration_ticks_s2 / change.abs());
     }
     if acceleration == f64::INFINITY {
         0.0

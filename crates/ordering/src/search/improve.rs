@@ -23,14 +23,22 @@ const KICKS: [usize; 2] = [5, 50];
 /// falls to 0 at the end.
 const TOLERANCE: f64 = 2.0;
 
+/// A pen-up move.
+#[derive(Clone, Copy, Default)]
+struct Link {
+    cost: f64,
+    /// Its other end.
+    to: End,
+}
+
 /// State of the local search.
 pub(crate) struct Search<'p> {
     problem: &'p Problem<'p>,
     tour: Tour,
-    /// The cost of the link at each end.
-    link_cost: Vec<f64>,
-    /// Overwritten link costs since the last commit, for undo.
-    changed: Vec<(End, f64)>,
+    /// The link at each end, as in the tour: one place in memory instead of three in the tour.
+    links: Vec<Link>,
+    /// Overwritten links since the last commit, for undo.
+    changed: Vec<(End, Link)>,
     /// Candidates of each end with their costs, cheapest first; those of end `e` are at
     /// `first[e]..first[e + 1]`.
     candidates: Vec<(f64, End)>,
@@ -75,7 +83,7 @@ impl<'p> Search<'p> {
         let mut search = Self {
             problem,
             tour: Tour::new(tour),
-            link_cost: vec![0.0; all.len()],
+            links: vec![Link::default(); all.len()],
             changed: Vec::new(),
             candidates,
             first,
@@ -88,8 +96,7 @@ impl<'p> Search<'p> {
         for place in 0..search.tour.len() {
             let [left, right] = search.tour.link_before(place);
             let cost = problem.cost(left, right);
-            search.link_cost[left as usize] = cost;
-            search.link_cost[right as usize] = cost;
+            search.set_link(left, right, cost);
             search.total += cost;
         }
         search
@@ -161,6 +168,11 @@ impl<'p> Search<'p> {
         self.tour.finish()
     }
 
+    fn set_link(&mut self, a: End, b: End, cost: f64) {
+        self.links[a as usize] = Link { cost, to: b };
+        self.links[b as usize] = Link { cost, to: a };
+    }
+
     fn enqueue(&mut self, end: End) {
         if !std::mem::replace(&mut self.queued[end as usize], true) {
             self.queue.push_back(end);
@@ -174,8 +186,8 @@ impl<'p> Search<'p> {
 
     fn undo(&mut self) {
         self.tour.undo();
-        while let Some((end, cost)) = self.changed.pop() {
-            self.link_cost[end as usize] = cost;
+        while let Some((end, link)) = self.changed.pop() {
+            self.links[end as usize] = link;
         }
     }
 
@@ -191,7 +203,7 @@ impl<'p> Search<'p> {
         while let Some(end) = self.queue.pop_front() {
             self.queued[end as usize] = false;
             self.ends[0] = end;
-            self.ends[1] = self.tour.link(end);
+            self.ends[1] = self.links[end as usize].to;
             // An exchange enqueues its ends, `end` among them.
             total += self.improve_at().unwrap_or(0.0);
         }
@@ -201,7 +213,7 @@ impl<'p> Search<'p> {
     /// Applies the first improving exchange of two or three links that removes the link
     /// `(ends[0], ends[1])`; returns its gain.
     fn improve_at(&mut self) -> Option<f64> {
-        let begin = self.link_cost[self.ends[0] as usize];
+        let begin = self.links[self.ends[0] as usize].cost;
         // Sorted by the gain after the first added link and the second removed link, largest first.
         let mut steps = [(0.0, 0, 0); CANDIDATES];
         let mut count = 0;
@@ -214,7 +226,8 @@ impl<'p> Search<'p> {
             if self.ends[..2].contains(&next) {
                 continue;
             }
-            let step = (begin - cost + self.link_cost[next as usize], next, self.tour.link(next));
+            let link = self.links[next as usize];
+            let step = (begin - cost + link.cost, next, link.to);
             let mut place = count;
             while place > 0 && steps[place - 1].0 < step.0 {
                 steps[place] = steps[place - 1];
@@ -248,8 +261,8 @@ impl<'p> Search<'p> {
             if self.ends[..4].contains(&next) {
                 continue;
             }
-            let other = self.tour.link(next);
-            let gain = before - cost + self.link_cost[next as usize] - self.problem.cost(other, self.ends[0]);
+            let Link { cost: removed, to: other } = self.links[next as usize];
+            let gain = before - cost + removed - self.problem.cost(other, self.ends[0]);
             if gain > self.least_gain() {
                 (self.ends[4], self.ends[5]) = (next, other);
                 if let Some(gain) = self.exchange(3) {
@@ -274,17 +287,16 @@ impl<'p> Search<'p> {
         self.work += self.tour.apply(&plan) as u64 / 4;
         let mut gain = 0.0;
         for link in ends.chunks_exact(2) {
-            gain += self.link_cost[link[0] as usize];
+            gain += self.links[link[0] as usize].cost;
             for &end in link {
-                self.changed.push((end, self.link_cost[end as usize]));
+                self.changed.push((end, self.links[end as usize]));
             }
         }
         for at in 0..count {
             let (a, b) = (ends[2 * at + 1], ends[(2 * at + 2) % ends.len()]);
             let cost = self.problem.cost(a, b);
             gain -= cost;
-            self.link_cost[a as usize] = cost;
-            self.link_cost[b as usize] = cost;
+            self.set_link(a, b, cost);
         }
         for &end in ends {
             self.enqueue(end);
