@@ -112,7 +112,7 @@ pub(super) fn has_caps(place: usize) -> bool {
 /// The path and the limits.
 pub(super) struct Problem<'a> {
     pub(super) limits: &'a Limits<'a>,
-    pub(super) samples: &'a [Point],
+    pub(super) centers: &'a [Point],
     pub(super) radii: &'a [f64],
 }
 
@@ -252,7 +252,7 @@ impl Problem<'_> {
         }
         let knots = (block.start - 1).max(1)..(block.end + 1).min(spline.count() - 1);
         let discs = knots.map(|i| {
-            let e = spline.value_of(control, i) - self.samples[i].to_vec2();
+            let e = spline.value_of(control, i) - self.centers[i].to_vec2();
             1.0 - e.hypot2() / (self.radii[i] * self.radii[i])
         });
         let slacks = spans
@@ -306,7 +306,7 @@ impl Problem<'_> {
         let knots = (block.start - 1).max(1)..(block.end + 1).min(spline.count() - 1);
         for i in knots {
             let row = spline.value[i];
-            let (first, hessian) = disc(spline.at_knot(i) - self.samples[i].to_vec2(), self.radii[i], mu);
+            let (first, hessian) = disc(spline.at_knot(i) - self.centers[i].to_vec2(), self.radii[i], mu);
             let at = |p: usize| (i + p).checked_sub(from + 1).filter(|index| *index < count);
             for p in 0..3 {
                 let Some(ip) = at(p) else { continue };

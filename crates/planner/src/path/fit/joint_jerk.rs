@@ -47,7 +47,7 @@ const JERK_OF_REST: f64 = 2.0 / 9.0;
 /// The path and the limits.
 pub(super) struct Problem<'a> {
     pub(super) limits: &'a Limits<'a>,
-    pub(super) samples: &'a [Point],
+    pub(super) centers: &'a [Point],
     pub(super) radii: &'a [f64],
 }
 
@@ -316,7 +316,7 @@ impl Problem<'_> {
         let mut time = 0.0;
         let knots = (block.start - 1).max(1)..(block.end + 1).min(count - 1);
         let discs = knots.map(|i| {
-            let e = spline.value_of(control, i) - self.samples[i].to_vec2();
+            let e = spline.value_of(control, i) - self.centers[i].to_vec2();
             1.0 - e.hypot2() / (self.radii[i] * self.radii[i])
         });
         let slacks = spans.clone().zip(&work.spans).map(|(j, span)| {
@@ -374,7 +374,7 @@ impl Problem<'_> {
         let knots = (block.start - 1).max(1)..(block.end + 1).min(total - 1);
         for i in knots {
             let row = spline.value[i];
-            let (first, mut hessian) = disc(spline.at_knot(i) - self.samples[i].to_vec2(), self.radii[i], mu);
+            let (first, mut hessian) = disc(spline.at_knot(i) - self.centers[i].to_vec2(), self.radii[i], mu);
             let damping = 2.0 * DAMPING * mu / (self.radii[i] * self.radii[i]);
             hessian[0] += damping;
             hessian[2] += damping;

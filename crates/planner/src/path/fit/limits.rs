@@ -56,6 +56,37 @@ impl<'a> Limits<'a> {
         self.everywhere.or_else(|| self.evaluate(p))
     }
 
+    /// A disc within the reach and within this one, around a point of the reach: at an edge at distance d,
+    /// moved from it by half of what is outside, so the radius r becomes `(r + d) / 2`, less a margin for
+    /// the bulge of a spline between its knots. Twice, for corners of the reach; a disc that has the
+    /// outside on opposite sides is kept.
+    pub(super) fn disc_within_reach(&self, center: Point, radius: f64) -> (Point, f64) {
+        const DIRECTIONS: u32 = 16;
+        const MARGIN: f64 = 0.05;
+        let is_reached = |p: Point| self.machine.check_point(p).is_ok();
+        let (mut disc, mut is_cut) = ((center, radius), false);
+        for _ in 0..2 {
+            let (center, radius) = disc;
+            let outside = (0..DIRECTIONS)
+                .map(|k| Vec2::from(libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS))))
+                .filter(|direction| !is_reached(center + radius * *direction))
+                .fold(Vec2::ZERO, |sum, direction| sum + direction);
+            let length = outside.hypot2().sqrt();
+            if length < 0.1 {
+                break;
+            }
+            let normal = outside / length;
+            let (mut inside, mut beyond) = (0.0, radius);
+            for _ in 0..20 {
+                let middle = 0.5 * (inside + beyond);
+                *(if is_reached(center + middle * normal) { &mut inside } else { &mut beyond }) = middle;
+            }
+            let shift = 0.5 * (radius - inside);
+            (disc, is_cut) = ((center - shift * normal, radius - shift), true);
+        }
+        if is_cut { (disc.0, (1.0 - MARGIN) * disc.1) } else { disc }
+    }
+
     fn evaluate(&self, p: Point) -> Option<MotorForms> {
         let pose = self.machine.mechanism().inverse(p).ok()?;
         let of = |x: f64, y: f64| self.machine.motor_derivatives(&pose, Vec2::new(x, y), Vec2::ZERO);

@@ -93,8 +93,8 @@ pub enum Aim {
 /// The stroke as a spline within `tolerance` mm; `None` for strokes that are one line or a dot, and
 /// where no spline is found: outside the reach, or if the radius would become too small.
 ///
-/// `cautious` takes fewer samples and a smaller radius, for strokes where the proof fails or the spline leaves
-/// the reach.
+/// `cautious` takes fewer samples, a smaller radius, and discs within the reach, for strokes where the proof fails
+/// or the spline leaves the reach.
 pub fn fitted(
     stroke: &Stroke,
     limits: &Limits<'_>,
@@ -118,7 +118,7 @@ pub fn fitted(
     if cautious {
         let radius = tolerance - (MERGE + SIMPLIFY) * tolerance - chord;
         let samples = Samples::of(&pieces, tolerance, grading.without_corners());
-        return Fit::new(samples, radius, CAUTIOUS)?.run(limits, aim);
+        return Fit::new(samples, radius, CAUTIOUS)?.within_reach(limits).run(limits, aim);
     }
     Fit::new(Samples::of(&pieces, tolerance, grading), radius, 1.0)?.run(limits, aim)
 }
@@ -170,7 +170,9 @@ struct Fit {
     spline: Spline,
     /// The bound that is proved, mm.
     bound: f64,
-    /// The radius at each knot, mm.
+    /// The disc within which each knot is: its center, the sample unless that is near the edge of
+    /// the reach, and its radius, mm.
+    centers: Vec<Point>,
     radii: Vec<f64>,
     energy: Energy,
 }
@@ -188,7 +190,20 @@ impl Fit {
         let spline = Spline::through(&samples.points);
         let energy = Energy::new(&spline, 1.0, THIRD);
         let radii = vec![at_first * bound; samples.points.len()];
-        Some(Self { samples, spline, bound, radii, energy })
+        let centers = samples.points.clone();
+        Some(Self { samples, spline, bound, centers, radii, energy })
+    }
+
+    /// With smaller discs at the edge of the reach, so that the spline does not leave it.
+    fn within_reach(mut self, limits: &Limits<'_>) -> Self {
+        for i in 1..self.count() - 1 {
+            (self.centers[i], self.radii[i]) = limits.disc_within_reach(self.centers[i], self.radii[i]);
+        }
+        if self.centers != self.samples.points {
+            self.spline = Spline::through(&self.centers);
+            self.energy = Energy::new(&self.spline, 1.0, THIRD);
+        }
+        self
     }
 
     /// The number of knots.
@@ -212,12 +227,12 @@ impl Fit {
             }
             blocks = clusters(&failures, self.count());
             let through =
-                interpolating.get_or_insert_with(|| self.spline.interpolating(&self.samples.points));
+                interpolating.get_or_insert_with(|| self.spline.interpolating(&self.centers));
             for block in &blocks {
                 restart(&mut self.spline, through, block);
             }
             let inside = |i: usize| {
-                let e = self.spline.at_knot(i) - self.samples.points[i].to_vec2();
+                let e = self.spline.at_knot(i) - self.centers[i].to_vec2();
                 e.hypot2() < self.radii[i] * self.radii[i]
             };
             if !blocks.iter().all(|block| block.clone().all(inside)) {
@@ -230,17 +245,17 @@ impl Fit {
 
     /// Fits the knots of the blocks.
     fn fit(&mut self, limits: &Limits<'_>, aim: Aim, blocks: &[Range<usize>]) -> Option<()> {
-        let Self { samples, spline, radii, energy, .. } = self;
+        let Self { spline, centers, radii, energy, .. } = self;
         let steps = if aim == Aim::Fastest { STEPS_BEFORE_JOINT } else { STEPS_ALONE };
         let mut work = tube::Workspace::default();
         for block in blocks {
-            tube::smooth(spline, &samples.points, radii, energy, block.clone(), steps, &mut work);
+            tube::smooth(spline, centers, radii, energy, block.clone(), steps, &mut work);
         }
         // Where no start is feasible the smoothest path is kept.
         match aim {
             Aim::Smoothest => {}
             Aim::Fastest => {
-                let problem = joint::Problem { limits, samples: &samples.points, radii };
+                let problem = joint::Problem { limits, centers, radii };
                 let mut b = problem.gentle_speeds(spline)?;
                 let mut work = joint::Workspace::default();
                 for block in blocks {
@@ -248,7 +263,7 @@ impl Fit {
                 }
             }
             Aim::FastestUnderJerk => {
-                let problem = joint_jerk::Problem { limits, samples: &samples.points, radii };
+                let problem = joint_jerk::Problem { limits, centers, radii };
                 let mut work = joint_jerk::Workspace::default();
                 let Some(mut z) = problem.gentle_speeds(spline, &mut work) else { return Some(()) };
                 for block in blocks {
