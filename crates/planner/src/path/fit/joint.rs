@@ -28,11 +28,11 @@ use super::{
 
 /// Number of Newton steps on a block. On the strokes of `tests/band.rs` drawing takes 0.3 % longer
 /// with 7 steps.
-const STEPS: usize = 8;
+pub(super) const STEPS: usize = 8;
 
 /// The same where the barrier's weight is still above this share of the duration: short steps delay
 /// it on dense strokes with many turns.
-const MOST_STEPS: usize = 12;
+pub(super) const MOST_STEPS: usize = 12;
 const LATE_WEIGHT: f64 = 0.01;
 
 /// The barrier's weight a constraint at first, and at which a block is finished, as shares of the
@@ -114,6 +114,8 @@ pub(super) struct Problem<'a> {
     pub(super) limits: &'a Limits<'a>,
     pub(super) centers: &'a [Point],
     pub(super) radii: &'a [f64],
+    /// The largest number of Newton steps: [`STEPS`] or [`MOST_STEPS`].
+    pub(super) most_steps: usize,
 }
 
 /// Buffers for the steps.
@@ -187,7 +189,7 @@ impl Problem<'_> {
         let constraints = (block.len() * 22) as f64;
         let mut cost = self.cost(spline, &work.control, &work.b, block, &spans, &work.spans)?;
         let mut mu = FIRST_WEIGHT * cost.time / constraints;
-        for step in 0..MOST_STEPS {
+        for step in 0..self.most_steps {
             if step >= STEPS && mu * constraints < LATE_WEIGHT * cost.time {
                 break;
             }

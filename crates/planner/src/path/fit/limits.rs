@@ -68,7 +68,9 @@ impl<'a> Limits<'a> {
         for _ in 0..2 {
             let (center, radius) = disc;
             let outside = (0..DIRECTIONS)
-                .map(|k| Vec2::from(libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS))))
+                .map(|k| {
+                    Vec2::from(libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS)))
+                })
                 .filter(|direction| !is_reached(center + radius * *direction))
                 .fold(Vec2::ZERO, |sum, direction| sum + direction);
             let length = outside.hypot2().sqrt();

@@ -93,8 +93,8 @@ pub enum Aim {
 /// The stroke as a spline within `tolerance` mm; `None` for strokes that are one line or a dot, and
 /// where no spline is found: outside the reach, or if the radius would become too small.
 ///
-/// `cautious` takes fewer samples, a smaller radius, and discs within the reach, for strokes where the proof fails
-/// or the spline leaves the reach.
+/// `cautious` takes fewer samples and steps, a smaller radius, and discs within the reach, for strokes where the
+/// proof fails or the spline leaves the reach.
 pub fn fitted(
     stroke: &Stroke,
     limits: &Limits<'_>,
@@ -118,9 +118,9 @@ pub fn fitted(
     if cautious {
         let radius = tolerance - (MERGE + SIMPLIFY) * tolerance - chord;
         let samples = Samples::of(&pieces, tolerance, grading.without_corners());
-        return Fit::new(samples, radius, CAUTIOUS)?.within_reach(limits).run(limits, aim);
+        return Fit::new(samples, radius, true)?.within_reach(limits).run(limits, aim);
     }
-    Fit::new(Samples::of(&pieces, tolerance, grading), radius, 1.0)?.run(limits, aim)
+    Fit::new(Samples::of(&pieces, tolerance, grading), radius, false)?.run(limits, aim)
 }
 
 /// Removes vertices of sequences of lines that are within half of `least` of the last one kept; the
@@ -175,11 +175,12 @@ struct Fit {
     centers: Vec<Point>,
     radii: Vec<f64>,
     energy: Energy,
+    /// Whether the first attempt was not proved or left the reach.
+    cautious: bool,
 }
 
 impl Fit {
-    /// `at_first` is the radius of the first round as a share of what is proved.
-    fn new(samples: Samples, radius: f64, at_first: f64) -> Option<Self> {
+    fn new(samples: Samples, radius: f64, cautious: bool) -> Option<Self> {
         if samples.points.windows(2).any(|pair| pair[0] == pair[1]) {
             return None;
         }
@@ -189,9 +190,10 @@ impl Fit {
         let bound = radius.min(share * extent);
         let spline = Spline::through(&samples.points);
         let energy = Energy::new(&spline, 1.0, THIRD);
+        let at_first = if cautious { CAUTIOUS } else { 1.0 };
         let radii = vec![at_first * bound; samples.points.len()];
         let centers = samples.points.clone();
-        Some(Self { samples, spline, bound, centers, radii, energy })
+        Some(Self { samples, spline, bound, centers, radii, energy, cautious })
     }
 
     /// With smaller discs at the edge of the reach, so that the spline does not leave it.
@@ -226,8 +228,7 @@ impl Fit {
                 self.radii[j + 1] *= factor;
             }
             blocks = clusters(&failures, self.count());
-            let through =
-                interpolating.get_or_insert_with(|| self.spline.interpolating(&self.centers));
+            let through = interpolating.get_or_insert_with(|| self.spline.interpolating(&self.centers));
             for block in &blocks {
                 restart(&mut self.spline, through, block);
             }
@@ -245,7 +246,7 @@ impl Fit {
 
     /// Fits the knots of the blocks.
     fn fit(&mut self, limits: &Limits<'_>, aim: Aim, blocks: &[Range<usize>]) -> Option<()> {
-        let Self { spline, centers, radii, energy, .. } = self;
+        let Self { spline, centers, radii, energy, cautious, .. } = self;
         let steps = if aim == Aim::Fastest { STEPS_BEFORE_JOINT } else { STEPS_ALONE };
         let mut work = tube::Workspace::default();
         for block in blocks {
@@ -255,7 +256,8 @@ impl Fit {
         match aim {
             Aim::Smoothest => {}
             Aim::Fastest => {
-                let problem = joint::Problem { limits, centers, radii };
+                let most_steps = if *cautious { joint::STEPS } else { joint::MOST_STEPS };
+                let problem = joint::Problem { limits, centers, radii, most_steps };
                 let mut b = problem.gentle_speeds(spline)?;
                 let mut work = joint::Workspace::default();
                 for block in blocks {
