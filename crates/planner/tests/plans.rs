@@ -3,7 +3,7 @@
 //! checks plans with independent forward kinematics.
 #![allow(clippy::unreadable_literal, reason = "inputs as a failing property gave them")]
 
-use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke};
+use drawing::{Affine, Drawing, EllipticArc, Pen, Point, Rect, Segment, Span, Stroke, Vec2};
 use kinematics::{JointPos, Machine, MotorPos};
 use planner::{Easing, ExactRow, PlanError, Settings, TimingLaw, plan};
 use planner::{PlacementOptions, Scale, place};
@@ -212,6 +212,22 @@ proptest! {
     ) {
         stays_within(&machine, &drawing, tolerance, period_us)?;
     }
+}
+
+/// As `--fit` places drawings: blended corners took 1.5 times as long.
+#[test]
+fn stroke_at_the_edge_of_the_reach_is_a_spline() {
+    let machine = machines::corexy();
+    let sheet = machine.sheet();
+    let radius = 0.5 * sheet.height();
+    let point = |k: u32| libm::sincos(std::f64::consts::TAU * f64::from(k) / 90.0);
+    let drawing_s = |radius: f64| {
+        let at = |(sin, cos): (f64, f64)| sheet.center() + radius * Vec2::new(cos, sin);
+        let drawing = Drawing::from(vec![polyline((0..=90).map(|k| at(point(k))).collect())]);
+        plan(&machine, drawing, &Settings::new(0.1, 10_000)).expect("it fits").times().drawing_s
+    };
+    let (at_edge, inside) = (drawing_s(radius), drawing_s(radius - 1.0));
+    assert!(at_edge < 1.03 * inside, "{at_edge} s, {inside} s a millimetre inside");
 }
 
 /// A polyline with short and long pieces, an arc and a dot.

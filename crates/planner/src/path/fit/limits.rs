@@ -122,6 +122,9 @@ impl MotorForms {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
+    use proptest::prelude::*;
     use test_support::machines;
 
     use super::*;
@@ -142,6 +145,33 @@ mod tests {
                 assert!((two * limit - m2[k]).abs() < 1e-9 * m2[k].abs());
                 let ahead = forms.motor(k, first + Vec2::new(1e-6, 0.0), second).1;
                 assert!((by_first.x - (ahead - two) / 1e-6).abs() < 1e-5 * (1.0 + by_first.x.abs()));
+            }
+        }
+    }
+    proptest! {
+        /// Discs around points of the reach lie within the reach and within the disc before.
+        #[test]
+        fn discs_at_the_edge_of_the_reach_are_within_it(
+            index in 0..3_usize, along in 0.0..TAU, share in 0.0..1.0f64, radius in 0.01..1.0f64,
+        ) {
+            let machine = [machines::corexy(), machines::arm(), machines::polar()][index].clone();
+            let limits = Limits::new(&machine, 60.0);
+            let is_reached = |p: Point| machine.check_point(p).is_ok();
+            // Up to the radius inside the edge in some direction from the middle of the sheet.
+            let direction = Vec2::from(libm::sincos(along));
+            let (mut inside, mut outside) = (0.0, 2000.0);
+            for _ in 0..60 {
+                let middle = 0.5 * (inside + outside);
+                *(if is_reached(machine.sheet().center() + middle * direction) { &mut inside } else { &mut outside }) = middle;
+            }
+            let point = machine.sheet().center() + (inside - share * radius).max(0.0) * direction;
+            prop_assume!(is_reached(point));
+            let (center, smaller) = limits.disc_within_reach(point, radius);
+            prop_assert!((center - point).hypot2().sqrt() + smaller <= radius + 1e-12);
+            prop_assert!(smaller > 0.2 * radius);
+            for k in 0..100 {
+                let edge = center + smaller * Vec2::from(libm::sincos(TAU * f64::from(k) / 100.0));
+                prop_assert!(is_reached(edge), "{edge:?} of {center:?}, {smaller}");
             }
         }
     }
