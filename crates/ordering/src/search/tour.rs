@@ -72,8 +72,9 @@ impl Tour {
         [mate(self.entries[before]), self.entries[place]]
     }
 
-    /// The other end of the link (pen-up move) at `end`.
-    pub(crate) fn link(&self, end: End) -> End {
+    /// The other end of the link (pen-up move) at `end`, which the search has in a table of its own.
+    #[cfg(test)]
+    fn link(&self, end: End) -> End {
         let (gap, entered) = self.gap(end);
         let [left, right] = self.link_before(gap);
         if entered { left } else { right }
