@@ -596,8 +596,8 @@ fn acceleration_limit_between_points_of_jerk_interval() {
     let machine = machines::with_jerk(&machines::polar(), 6000.0 / 88_539.931_381_337_32);
     let arc = EllipticArc {
         center: Point::new(0.5748581417638099, 0.15942215694678485),
-        a: drawing::Vec2::new(0.2356550461267668, 0.0),
-        b: drawing::Vec2::new(0.0, 0.09426201845070672),
+        a: Vec2::new(0.2356550461267668, 0.0),
+        b: Vec2::new(0.0, 0.09426201845070672),
         start_rad: -2.47424881794882,
         sweep_rad: -5.537629441915333,
     };
