@@ -129,8 +129,9 @@ pub(crate) fn run(arguments: &[&str]) -> Result<bool> {
         let (start, cpu) = (Instant::now(), cpu_time_of_children());
         let result = (campaign.run)(scale);
         let seconds = start.elapsed().as_secs_f64();
-        let cpu =
-            cpu_time_of_children().zip(cpu).map_or(f64::NAN, |(end, start)| (end - start).as_secs_f64());
+        let cpu = cpu_time_of_children()
+            .zip(cpu)
+            .map_or(f64::NAN, |(end, start)| end.saturating_sub(start).as_secs_f64());
         failed |= result.is_err();
         let outcome = result.map_or_else(|error| format!("FAILED: {error:#}"), |()| "ok".to_owned());
         writeln!(report, "{:10} {seconds:7.0} s, {cpu:7.0} s of processor time  {outcome}", campaign.name)?;

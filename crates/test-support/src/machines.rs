@@ -154,7 +154,7 @@ pub fn machine() -> impl Strategy<Value = Machine> {
                     (mechanism.manipulability(&q) > 0.15).then_some(q)
                 })
                 .collect();
-            let poses = poses?;
+            let poses = poses.filter(|poses| is_in_one_part(&*mechanism, poses))?;
             let start = middle + mechanism.full_rotation().unwrap_or_default() * f64::from(turns);
             let range = |k: usize| {
                 let Some(margins) = limits else { return JointRange::FREE };
@@ -206,6 +206,17 @@ pub fn point_within(mechanism: &dyn Mechanism, direction: f64, share: f64, least
     let distances: Vec<f64> = (1..1000).map(f64::from).filter(good).collect();
     let index = (share * distances.len() as f64) as usize;
     distances.get(index).map(|r| at(*r))
+}
+
+/// Whether no angle jumps between neighbours of a [`grid`]: a sheet across the line between the bases of a
+/// five-bar lies in two parts of the reach.
+fn is_in_one_part(mechanism: &dyn Mechanism, poses: &[JointPos]) -> bool {
+    let turns = mechanism.joint_kinds().map(|kind| kind == JointKind::Revolute);
+    let near = |from: usize, to: usize| {
+        let change = (poses[to] - poses[from]).abs();
+        (0..2).all(|k| !turns[k] || change[k] < PI)
+    };
+    (0..poses.len()).all(|k| (k % 9 == 8 || near(k, k + 1)) && (k + 9 >= poses.len() || near(k, k + 9)))
 }
 
 /// Points over a sheet, its border included.

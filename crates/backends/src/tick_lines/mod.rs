@@ -286,8 +286,8 @@ mod tests {
 
     #[test]
     fn damaged_last_row_is_reported() {
-        // The same bit in two bytes: the checksum is right.
-        let (sound, damaged) = ("803 -4*", "802 -5*");
+        // The same bit in two bytes of the last row: the checksum is right.
+        let (sound, damaged) = ("10000 803 -4*", "10000 802 -5*");
         assert_eq!(framing::framed("803 -4")[6..], framing::framed("802 -5")[6..]);
         assert!(matches!(outcome(sound, sound, true), Outcome::Done));
         let Outcome::Failed { why, .. } = outcome(sound, damaged, true) else {
