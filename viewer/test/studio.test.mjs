@@ -631,7 +631,7 @@ test("sending is paused, unplugged, stopped and resumed, and nothing is drawn tw
   assert.equal(await sent(page), "done");
   const whole = await page.evaluate(() => window.plotplanStudio.sender.emulated.drawn());
   await page.selectOption("#send-to", "port");
-  await plugIn(page, "ticks", 4);
+  await plugIn(page, "ticks", 1);
   const ended = await sent(page, async () => {
     await page.click("#pause");
     await says(page, "Paused with the pen up");
